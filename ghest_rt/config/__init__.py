@@ -1,0 +1,1 @@
+"""The station file: which sensors, which calibration, which estimator, where to publish."""

@@ -1,0 +1,76 @@
+"""Read a station file; every problem is told with file, key path and remedy."""
+
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+
+from pydantic import ValidationError
+
+from ghest_rt.config.station import StationConfig
+from ghest_rt.errors import BadInputError
+
+_MAX_BYTES = 1_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class LoadedStation:
+    """A station file with what it refers to, so that a recording can carry both.
+
+    Attributes:
+        config: The parsed file.
+        toml_text: The file as it was written.
+        urdf_text: The URDF it names.
+        source: Where it came from, for messages.
+    """
+
+    config: StationConfig
+    toml_text: str
+    urdf_text: str
+    source: str
+
+
+def parse_station(toml_text: str, source: str) -> StationConfig:
+    """Parse a station file's text.
+
+    Raises:
+        BadInputError: Not TOML, or a key is missing, unknown or out of range; names `source` and each key.
+    """
+    try:
+        return StationConfig.model_validate(tomllib.loads(toml_text))
+    except tomllib.TOMLDecodeError as error:
+        raise BadInputError(f"{source}: not a valid TOML file: {error}") from error
+    except ValidationError as error:
+        lines = []
+        for item in error.errors(include_url=False):
+            key = ".".join(str(part) for part in item["loc"]) or "(file)"
+            message = item["msg"].removeprefix("Value error, ")
+            remedy = {
+                "missing": "add this key",
+                "extra_forbidden": "remove it or correct its spelling",
+            }.get(item["type"], "correct it")
+            lines.append(f"  {key}: {message} ({remedy})")
+        raise BadInputError(f"{source}: not a valid station file:\n" + "\n".join(lines)) from error
+
+
+def load_station(path: Path) -> LoadedStation:
+    """Read a station file and the URDF it names (relative to the file).
+
+    Raises:
+        BadInputError: A file is missing, too large, not text, or invalid.
+    """
+    toml_text = _read_text(path, "station file")
+    config = parse_station(toml_text, str(path))
+    urdf_path = path.parent / config.exoskeleton.urdf
+    urdf_text = _read_text(urdf_path, f"URDF named by exoskeleton.urdf in {path}")
+    return LoadedStation(config, toml_text, urdf_text, str(path))
+
+
+def _read_text(path: Path, what: str) -> str:
+    try:
+        if path.stat().st_size > _MAX_BYTES:
+            raise BadInputError(f"{path}: {what} is larger than {_MAX_BYTES} bytes; is it the right file?")
+        return path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise BadInputError(f"{path}: cannot read the {what}: {error.strerror or error}") from error
+    except UnicodeDecodeError as error:
+        raise BadInputError(f"{path}: {what} is not UTF-8 text (byte {error.start})") from error

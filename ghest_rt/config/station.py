@@ -1,0 +1,139 @@
+"""Schema of the station file (TOML). Unknown keys, wrong units and non-rigid matrices are refused."""
+
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import AfterValidator, Field, model_validator
+
+from ghest_rt.config.devices import CameraBackend, EncoderBackend
+from ghest_rt.config.strict import Strict
+from ghest_rt.geometry.se3 import rigidity_problem
+from ghest_rt.geometry.so3 import Array
+
+STATION_FORMAT = 1
+
+Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]{1,64}$")]
+Row = tuple[float, float, float, float]
+Byte = Annotated[int, Field(ge=0, le=255)]
+Rgb = tuple[Byte, Byte, Byte]
+
+
+def _rigid(rows: tuple[Row, Row, Row, Row]) -> tuple[Row, Row, Row, Row]:
+    problem = rigidity_problem(np.array(rows))
+    if problem:
+        raise ValueError(f"the matrix {problem}; translations are in metres, rotations are unit columns")
+    return rows
+
+
+RigidMatrix = Annotated[tuple[Row, Row, Row, Row], AfterValidator(_rigid)]
+
+
+class Station(Strict):
+    """Who this is."""
+
+    id: Name = Field(description="Key segment under which this station publishes: ghest/<id>/…")
+    arm: Literal["right", "left"] = Field(description="The patient's arm in the exoskeleton; sets the clinical signs")
+
+
+class Exoskeleton(Strict):
+    """The kinematic model and the settings made for this patient."""
+
+    urdf: str = Field(description="URDF file, relative to the station file")
+    base_link: str = "l0"
+    settings_m: dict[str, float] = Field(default={}, description="Prismatic joints set per patient, metres")
+
+
+class Marker(Strict):
+    """A square plate with one coloured disk per corner, eq. (5): p0 (+a,-a), p1 (-a,-a), p2 (+a,+a), p3 (-a,+a)."""
+
+    half_spacing_m: float = Field(gt=0.002, lt=0.2, description="a: half the distance between neighbouring disk centres")
+    disk_radius_m: float = Field(gt=0.001, lt=0.1)
+    plate_m: float = Field(gt=0.004, lt=0.5, description="Side of the square white plate")
+    disk_rgb: tuple[Rgb, Rgb, Rgb, Rgb] = Field(description="Nominal colours of p0..p3 under neutral light")
+
+    @model_validator(mode="after")
+    def _fits(self) -> "Marker":
+        if self.disk_radius_m >= self.half_spacing_m:
+            raise ValueError("disk_radius_m must be less than half_spacing_m: the disks would touch")
+        if 2 * (self.half_spacing_m + self.disk_radius_m) > self.plate_m:
+            raise ValueError("plate_m is too small for the disks")
+        return self
+
+
+class Camera(Strict):
+    """One RGB-D camera on one link, looking at one marker."""
+
+    link: str = Field(description="URDF link the camera is fixed to")
+    marker: Name
+    device: CameraBackend = Field(discriminator="backend")
+
+
+class Encoders(Strict):
+    """The exoskeleton's encoder link."""
+
+    joints: tuple[str, ...] = Field(min_length=1, description="URDF joints measured, in the order they are sent")
+    device: EncoderBackend = Field(discriminator="backend")
+
+
+class Calibration(Strict):
+    """Rigid transforms found by calibration, (4, 4) row by row, metres."""
+
+    id: Name
+    link_from_camera: dict[str, RigidMatrix] = Field(description="Camera (OpenCV axes) in its link's frame, eq. (6)")
+    m0_from_gh: RigidMatrix = Field(description="GH joint frame in the m0 frame, eq. (8)")
+    m1_from_elw: RigidMatrix = Field(description="Elbow frame in the m1 frame, eq. (9)")
+
+    def link_from_camera_array(self, camera: str) -> Array:
+        """Return T_r^l of eq. (6)."""
+        return np.array(self.link_from_camera[camera])
+
+
+class Estimator(Strict):
+    """How angles are computed."""
+
+    method: Literal["paper", "refined"] = "refined"
+    encoder_pairing: Literal["interpolate", "nearest"] = "interpolate"
+    lag_ms: float = Field(
+        default=45.0, ge=0.0, le=500.0, description="A sample is published this long after the instant it holds for"
+    )
+    max_gap_ms: float = Field(default=100.0, gt=0, description="Longest gap in an input that is interpolated over")
+    sigma_limit_deg: float = Field(default=5.0, gt=0, description="Above this the sample is `degraded`")
+
+
+class Publisher(Strict):
+    """Zenoh. Out of the box nothing leaves this machine."""
+
+    enabled: bool = True
+    listen: tuple[str, ...] = ("tcp/127.0.0.1:7447",)
+    connect: tuple[str, ...] = ()
+
+
+class StationConfig(Strict):
+    """The whole station file."""
+
+    format: Literal[1]
+    station: Station
+    rate_hz: float = Field(default=66.6, ge=1.0, le=500.0, description="Publishing rate")
+    exoskeleton: Exoskeleton
+    markers: dict[Name, Marker]
+    cameras: dict[Name, Camera]
+    encoders: Encoders
+    calibration: Calibration
+    estimator: Estimator = Estimator()
+    publisher: Publisher = Publisher()
+
+    @model_validator(mode="after")
+    def _complete(self) -> "StationConfig":
+        groups = (
+            ("markers", self.markers, {"m0", "m1"}),
+            ("cameras", self.cameras, {"r0", "r1"}),
+            ("calibration.link_from_camera", self.calibration.link_from_camera, {"r0", "r1"}),
+        )
+        for key, group, wanted in groups:
+            missing = sorted(wanted - set(group))
+            if missing:
+                raise ValueError(f"[{key}] lacks {', '.join(missing)}")
+        for camera, marker in (("r0", "m0"), ("r1", "m1")):
+            if self.cameras[camera].marker != marker:
+                raise ValueError(f"cameras.{camera}.marker must be {marker}: r0 sees the acromion, r1 the upper arm")
+        return self
