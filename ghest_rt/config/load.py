@@ -10,6 +10,7 @@ from ghest_rt.config.station import StationConfig
 from ghest_rt.errors import BadInputError
 
 _MAX_BYTES = 1_000_000
+_REMEDIES = {"missing": "add this key", "extra_forbidden": "remove it or correct its spelling"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,10 +45,9 @@ def parse_station(toml_text: str, source: str) -> StationConfig:
         for item in error.errors(include_url=False):
             key = ".".join(str(part) for part in item["loc"]) or "(file)"
             message = item["msg"].removeprefix("Value error, ")
-            remedy = {
-                "missing": "add this key",
-                "extra_forbidden": "remove it or correct its spelling",
-            }.get(item["type"], "correct it")
+            remedy = _REMEDIES.get(item["type"], "correct it")
+            if item["type"] == "less_than" and key.endswith("_m"):
+                remedy = "this key is in metres; are these millimetres?"
             lines.append(f"  {key}: {message} ({remedy})")
         raise BadInputError(f"{source}: not a valid station file:\n" + "\n".join(lines)) from error
 

@@ -1,0 +1,89 @@
+"""A station file that is wrong is refused with file, key path and remedy."""
+
+from pathlib import Path
+
+import pytest
+
+from ghest_rt.config.load import load_station, parse_station
+from ghest_rt.errors import BadInputError
+
+IDENTITY = "[[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]]"
+MARKER = """half_spacing_m = 0.018
+disk_radius_m = 0.008
+plate_m = 0.06
+disk_rgb = [[214, 40, 57], [124, 181, 24], [0, 158, 165], [122, 62, 180]]
+"""
+GOOD = f"""
+format = 1
+[station]
+id = "test"
+arm = "right"
+[exoskeleton]
+urdf = "exo.urdf"
+[markers.m0]
+{MARKER}
+[markers.m1]
+{MARKER}
+[cameras.r0]
+link = "l0"
+marker = "m0"
+device = {{ backend = "sim" }}
+[cameras.r1]
+link = "l8"
+marker = "m1"
+device = {{ backend = "sim" }}
+[encoders]
+joints = ["j0", "j1"]
+device = {{ backend = "sim" }}
+[calibration]
+id = "cal-1"
+m0_from_gh = {IDENTITY}
+m1_from_elw = {IDENTITY}
+[calibration.link_from_camera]
+r0 = {IDENTITY}
+r1 = {IDENTITY}
+"""
+
+
+def test_a_good_file_loads_with_its_urdf(tmp_path: Path) -> None:
+    (tmp_path / "exo.urdf").write_text("<robot name='x'/>")
+    (tmp_path / "station.toml").write_text(GOOD)
+    station = load_station(tmp_path / "station.toml")
+    assert station.config.station.id == "test"
+    assert station.config.estimator.method == "refined"
+    assert station.urdf_text == "<robot name='x'/>"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('arm = "right"', 'arm = "right"\nmode = 1', ("station.mode", "remove it")),
+        ('arm = "right"', "", ("station.arm", "add this key")),
+        ('arm = "right"', 'arm = "middle"', ("station.arm", "'right' or 'left'")),
+        ("half_spacing_m = 0.018", "half_spacing_m = 18.0", ("markers.m0.half_spacing_m", "less than 0.2", "millimetres?")),
+        ("plate_m = 0.06", "plate_m = 0.04", ("markers.m0", "too small")),
+        ("r0 = [[1.0, 0.0", "r0 = [[2.0, 0.0", ("calibration.link_from_camera.r0", "not rigid")),
+        ("r1 = [[1.0", "r2 = [[1.0", ("calibration.link_from_camera", "lacks r1")),
+        ('marker = "m1"', 'marker = "m0"', ("cameras.r1.marker must be m1",)),
+        ("format = 1", "format = 2", ("format",)),
+        ("format = 1", "format = = 1", ("not a valid TOML file", "line 2")),
+    ],
+)
+def test_each_mistake_is_named(old: str, new: str, words: tuple[str, ...]) -> None:
+    assert old in GOOD
+    with pytest.raises(BadInputError) as caught:
+        parse_station(GOOD.replace(old, new, 1), "clinic.toml")
+    assert str(caught.value).startswith("clinic.toml: ")
+    for word in words:
+        assert word in str(caught.value)
+
+
+def test_missing_files_are_named(tmp_path: Path) -> None:
+    with pytest.raises(BadInputError, match="station file"):
+        load_station(tmp_path / "absent.toml")
+    (tmp_path / "station.toml").write_text(GOOD)
+    with pytest.raises(BadInputError, match=r"exo\.urdf"):
+        load_station(tmp_path / "station.toml")
+    (tmp_path / "binary.toml").write_bytes(b"\xff\xfe")
+    with pytest.raises(BadInputError, match="UTF-8"):
+        load_station(tmp_path / "binary.toml")
