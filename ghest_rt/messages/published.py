@@ -1,0 +1,177 @@
+"""What leaves the process on Zenoh, as JSON. Degrees and milliseconds here, in contrast to the inside.
+
+`docs/subscribing.md` explains every field to subscribers; `docs/schema/` holds the JSON Schemas made from these classes.
+"""
+
+from enum import StrEnum
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from ghest_rt.messages.results import Reason, Status
+
+Vector3 = tuple[float, float, float]
+Quaternion = tuple[float, float, float, float]
+NonNegative = Annotated[float, Field(ge=0.0)]
+
+
+class _Message(BaseModel):
+    """The base of every message: refuses unknown fields, cannot be changed once made."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Clinical(_Message):
+    """The three clinical angles in degrees, or their standard deviations."""
+
+    flexion: float = Field(description="Raising the arm, degrees; minus the angle about y")
+    abduction: float = Field(description="Horizontal abduction, away from the body, degrees")
+    rotation: float = Field(description="Internal rotation about the upper arm's own axis, degrees")
+
+
+class IsbYxy(_Message):
+    """The ISB's Y-X-Y angles of the GH joint (Wu et al. 2005, 2.4.7), degrees; docs/angles.md."""
+
+    plane_of_elevation: float = Field(description="0 = abduction, 90 = forward flexion")
+    elevation: float = Field(ge=0.0, le=180.0, description="Between the arm and straight down")
+    axial_rotation: float = Field(description="Internal rotation")
+
+
+class SwingTwist(_Message):
+    """Swing to where the arm points by the shortest way, then twist about the arm; degrees."""
+
+    swing_flexion: float = Field(description="Part of the swing that raises the arm")
+    swing_abduction: float = Field(description="Part of the swing away from the body")
+    twist: float = Field(description="Internal rotation about the arm; equals the torsion of tilt and torsion")
+    tilt: float = Field(ge=0.0, le=180.0, description="Size of the swing: between the arm and straight forward")
+    azimuth: float = Field(description="Direction of the tilt")
+
+
+class Singular(_Message):
+    """Which angles stand so near their singularity that they say little one by one; the quaternion never does."""
+
+    euler_yxz: bool = Field(description="Also holds for angles_deg")
+    isb_yxy: bool
+    swing_twist: bool
+    azimuth: bool = Field(description="The azimuth of swing_twist_deg alone")
+
+
+class GhAngles(_Message):
+    """The glenohumeral joint at one instant: `ghest/<station>/gh/angles`. Without angles when the status is `lost`."""
+
+    schema_version: Literal[1] = 1
+    seq: int = Field(ge=0, description="Counts every message of this publisher since it started; a gap is a lost message")
+    t_sample_ns: int = Field(description="Instant the angles hold for, host monotonic clock, on an absolute grid")
+    t_publish_ns: int = Field(description="Instant of publishing, same clock")
+    t_sample_unix_ns: int = Field(description="t_sample_ns as Unix time")
+    status: Status
+    reason: Reason
+    angles_deg: Clinical | None
+    sigma_deg: Clinical | None = Field(description="Standard deviations of angles_deg; null if the method computes none")
+    euler_yxz_deg: Vector3 | None = Field(description="(a, b, g): intrinsic rotations about y, x, z, the paper's angles")
+    quaternion_wxyz: Quaternion | None = Field(description="Unit quaternion of the upper arm in the GH frame, w >= 0")
+    isb_yxy_deg: IsbYxy | None
+    swing_twist_deg: SwingTwist | None
+    singular: Singular | None
+    arm_position_m: Vector3 | None = Field(description="Middle of the upper arm in the frame of marker m0, metres")
+    age_ms: dict[str, float | None] = Field(
+        description="Per input (r0, r1, encoders): from the capture of its newest sample used to publishing; null if never seen"
+    )
+    method: str
+    calibration_id: str
+
+
+class Lateness(_Message):
+    """How late ticks came, microseconds, since the start."""
+
+    p50_us: NonNegative
+    p99_us: NonNegative
+    p999_us: NonNegative
+    max_us: NonNegative
+
+
+class InputState(StrEnum):
+    """How an input is doing."""
+
+    CONNECTING = "connecting"
+    STREAMING = "streaming"
+    SILENT = "silent"  # open, but nothing arrives
+    LOST = "lost"  # gone; being opened again with growing pauses
+    ENDED = "ended"  # a finite source is through
+
+
+class InputHealth(_Message):
+    """One camera or the encoders, counted since the start."""
+
+    state: InputState
+    received: int = Field(ge=0, description="Samples taken from the device")
+    missing: int = Field(ge=0, description="Gaps in the device's own count")
+    skipped: int = Field(ge=0, description="Frames passed over because vision was slower than the camera")
+    bad: int = Field(ge=0, description="Samples that could not be used")
+    reopened: int = Field(ge=0, description="Times the device was opened again")
+    rate_hz: NonNegative = Field(description="Over the last second")
+
+
+class Health(_Message):
+    """How the service itself is doing, once a second: `ghest/<station>/health`."""
+
+    schema_version: Literal[1] = 1
+    seq: int = Field(ge=0)
+    t_ns: int = Field(description="Host monotonic clock")
+    t_unix_ns: int
+    uptime_s: NonNegative
+    status: Status = Field(description="Of the newest published sample")
+    reason: Reason
+    published: int = Field(ge=0, description="Samples published")
+    valid: int = Field(ge=0, description="Samples published with status valid")
+    rate_hz: NonNegative = Field(description="Published samples a second, over the last second")
+    missed_ticks: int = Field(ge=0, description="Grid slots skipped because the machine was too busy")
+    lateness: Lateness
+    inputs: dict[str, InputHealth]
+    cpu_percent: NonNegative = Field(description="Of one core, over the last second")
+    memory_mb: NonNegative = Field(description="Resident")
+
+
+class EventKind(StrEnum):
+    """What happened."""
+
+    STARTED = "started"
+    STOPPED = "stopped"
+    INPUT_CONNECTED = "input_connected"
+    INPUT_SILENT = "input_silent"
+    INPUT_BACK = "input_back"
+    INPUT_LOST = "input_lost"
+    INPUT_ENDED = "input_ended"
+    INPUT_CHANGED = "input_changed"
+    BAD_DATA = "bad_data"
+    FRAMES_SKIPPED = "frames_skipped"
+    STATUS_CHANGED = "status_changed"
+    INTERNAL_ERROR = "internal_error"
+
+
+class Event(_Message):
+    """Something worth knowing happened: `ghest/<station>/events`."""
+
+    schema_version: Literal[1] = 1
+    seq: int = Field(ge=0)
+    t_ns: int = Field(description="Host monotonic clock")
+    t_unix_ns: int
+    severity: Literal["info", "warning", "error"]
+    kind: EventKind
+    source: str = Field(description="Input concerned (r0, r1, encoders), or service")
+    message: str
+
+
+PUBLISHED: dict[str, type[BaseModel]] = {"gh_angles": GhAngles, "health": Health, "event": Event}
+
+
+def json_schemas() -> dict[str, dict[str, object]]:
+    """Return the JSON Schema (2020-12) of every published message, by file name stem."""
+    schemas: dict[str, dict[str, object]] = {}
+    for name, model in PUBLISHED.items():
+        schema: dict[str, object] = {
+            "$schema": "https://json-schema.org/draft/2020-12/schema",
+            **model.model_json_schema(mode="serialization"),
+        }
+        schemas[name] = schema
+    return schemas

@@ -1,0 +1,115 @@
+"""From an estimate (radians, metres) to the message published (degrees, ages)."""
+
+import math
+
+from ghest_rt.estimation.angles import Arm, clinical, euler_yxz
+from ghest_rt.estimation.isb import isb_yxy
+from ghest_rt.estimation.swing_twist import swing_twist
+from ghest_rt.estimation.uncertainty import euler_sigma_rad
+from ghest_rt.geometry.so3 import Array, quat_wxyz_from_matrix
+from ghest_rt.messages.published import Clinical, GhAngles, IsbYxy, Singular, SwingTwist
+from ghest_rt.messages.results import GhEstimate
+
+_INPUTS = ("r0", "r1", "encoders")
+
+
+def sigma_of(gh_from_arm: Array, covariance: Array | None) -> Clinical | None:
+    """Return the standard deviations of the clinical angles, degrees; None if the covariance is unknown."""
+    if covariance is None:
+        return None
+    a, b, g = (math.degrees(sigma) for sigma in euler_sigma_rad(gh_from_arm, covariance))
+    return Clinical(flexion=a, abduction=b, rotation=g)
+
+
+def clinical_deg(gh_from_arm: Array, arm: Arm) -> Clinical:
+    """Return the clinical angles, degrees."""
+    angles = clinical(euler_yxz(gh_from_arm), arm)
+    return Clinical(
+        flexion=math.degrees(angles.flexion_rad),
+        abduction=math.degrees(angles.abduction_rad),
+        rotation=math.degrees(angles.rotation_rad),
+    )
+
+
+class AnglesComposer:
+    """Numbers the samples and fills in what every message of a run has in common."""
+
+    def __init__(self, arm: Arm, method: str, calibration_id: str, unix_offset_ns: int, first_seq: int = 0) -> None:
+        """Prepare the run.
+
+        Args:
+            arm: The patient's arm in the exoskeleton.
+            method: Name of the estimation method.
+            calibration_id: From the station file.
+            unix_offset_ns: Unix time minus the service's clock.
+            first_seq: Number of the first sample.
+        """
+        self.next_seq = first_seq
+        self._arm: Arm = arm
+        self._method = method
+        self._calibration_id = calibration_id
+        self._unix_offset_ns = unix_offset_ns
+
+    def unix_ns(self, t_ns: int) -> int:
+        """Return Unix time of an instant of the service's clock."""
+        return t_ns + self._unix_offset_ns
+
+    def compose(self, estimate: GhEstimate, t_publish_ns: int) -> GhAngles:
+        """Return the message for an estimate about to be published at `t_publish_ns`."""
+        seq = self.next_seq
+        self.next_seq += 1
+        R, newest_ns = estimate.gh_from_arm, estimate.newest_ns
+        common = {
+            "seq": seq,
+            "t_sample_ns": estimate.t_sample_ns,
+            "t_publish_ns": t_publish_ns,
+            "t_sample_unix_ns": self.unix_ns(estimate.t_sample_ns),
+            "status": estimate.status,
+            "reason": estimate.reason,
+            "age_ms": {name: (t_publish_ns - newest_ns[name]) * 1e-6 if name in newest_ns else None for name in _INPUTS},
+            "method": self._method,
+            "calibration_id": self._calibration_id,
+        }
+        if R is None or estimate.m0_from_arm is None:
+            return GhAngles.model_validate(common | _NO_ANGLES)
+        euler, isb, swing = euler_yxz(R), isb_yxy(R, self._arm), swing_twist(R, self._arm)
+        angles = {
+            "angles_deg": clinical_deg(R, self._arm),
+            "sigma_deg": sigma_of(R, estimate.covariance),
+            "euler_yxz_deg": (math.degrees(euler.a_rad), math.degrees(euler.b_rad), math.degrees(euler.g_rad)),
+            "quaternion_wxyz": tuple(quat_wxyz_from_matrix(R).tolist()),
+            "isb_yxy_deg": IsbYxy(
+                plane_of_elevation=math.degrees(isb.plane_of_elevation_rad),
+                elevation=math.degrees(isb.elevation_rad),
+                axial_rotation=math.degrees(isb.axial_rotation_rad),
+            ),
+            "swing_twist_deg": SwingTwist(
+                swing_flexion=math.degrees(swing.swing_flexion_rad),
+                swing_abduction=math.degrees(swing.swing_abduction_rad),
+                twist=math.degrees(swing.twist_rad),
+                tilt=math.degrees(swing.tilt_rad),
+                azimuth=math.degrees(swing.azimuth_rad),
+            ),
+            "singular": Singular(
+                euler_yxz=euler.near_singularity,
+                isb_yxy=isb.near_singularity,
+                swing_twist=swing.near_singularity,
+                azimuth=swing.azimuth_near_singularity,
+            ),
+            "arm_position_m": tuple(estimate.m0_from_arm[:3, 3].tolist()),
+        }
+        return GhAngles.model_validate(common | angles)
+
+
+_NO_ANGLES = dict.fromkeys(
+    (
+        "angles_deg",
+        "sigma_deg",
+        "euler_yxz_deg",
+        "quaternion_wxyz",
+        "isb_yxy_deg",
+        "swing_twist_deg",
+        "singular",
+        "arm_position_m",
+    )
+)

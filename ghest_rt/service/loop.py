@@ -1,0 +1,356 @@
+"""The service: cameras and encoders in, one sample per grid slot out, whatever happens to the devices."""
+
+import asyncio
+import gc
+import logging
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+
+from ghest_drivers.interfaces import EncoderLink, RgbdCamera
+from ghest_drivers.samples import CameraInfo, EncoderInfo, EncoderSample, RgbdFrame
+from ghest_rt.errors import DeviceError
+from ghest_rt.messages.published import Event, EventKind, InputState, Lateness
+from ghest_rt.messages.results import GhEstimate, MarkerObservation, Reason, Status
+from ghest_rt.service.alarm import Alarm, make_alarm
+from ghest_rt.service.camera_worker import CameraWorker
+from ghest_rt.service.clocks import ServiceClock
+from ghest_rt.service.compose import AnglesComposer
+from ghest_rt.service.encoder_worker import ENCODERS, EncoderWorker
+from ghest_rt.service.health import HealthMeter, SampleCounts, lateness
+from ghest_rt.service.inputs import InputCounters, InputSettings, Severity
+from ghest_rt.service.outputs import Output
+from ghest_rt.service.pacing import Pacer
+from ghest_rt.sync.grid import Grid
+
+_log = logging.getLogger(__name__)
+
+_STOP_TIMEOUT_S = 0.7  # SIGTERM must end the service within a second, even if a device hangs in its close
+_HEALTH_PERIOD_NS = 1_000_000_000
+_LEVELS = {"info": logging.INFO, "warning": logging.WARNING, "error": logging.ERROR}
+
+
+class PipelineLike(Protocol):
+    """From frames and encoder samples to estimates (`ghest_rt.estimation.pipeline.Pipeline`)."""
+
+    def observe(self, frame: RgbdFrame) -> MarkerObservation:
+        """Find the marker in a frame; called on that camera's thread."""
+        ...
+
+    def add(self, item: MarkerObservation | EncoderSample) -> None:
+        """Take in a result of `observe` or an encoder sample; called on the loop's thread."""
+        ...
+
+    def estimate(self, t_ns: int) -> GhEstimate:
+        """Return the joint at `t_ns`; called on the loop's thread."""
+        ...
+
+
+MakePipeline = Callable[[dict[str, CameraInfo], tuple[str, ...]], PipelineLike]
+
+
+@dataclass(frozen=True, slots=True)
+class ServiceSettings:
+    """What the service needs to know of the station.
+
+    Attributes:
+        rate_hz: Grid rate.
+        lag_ns: A sample is published this long after the instant it holds for.
+        inputs: How devices are watched.
+    """
+
+    rate_hz: float
+    lag_ns: int
+    inputs: InputSettings = field(default_factory=InputSettings)
+
+
+@dataclass(frozen=True, slots=True)
+class ServiceSummary:
+    """What a run of the service came to.
+
+    Attributes:
+        duration_s: On the service's clock, between the first and the last tick.
+        published: Samples published.
+        valid: Of these with status valid.
+        degraded: Of these with status degraded.
+        starting: Of these before every input had arrived.
+        missed_ticks: Grid slots skipped.
+        lateness: How late the ticks came.
+        inputs: Counters of every input.
+    """
+
+    duration_s: float
+    published: int
+    valid: int
+    degraded: int
+    starting: int
+    missed_ticks: int
+    lateness: Lateness
+    inputs: Mapping[str, InputCounters]
+
+
+class Service:
+    """Runs until `stop` is called or every input has ended."""
+
+    def __init__(
+        self,
+        *,
+        settings: ServiceSettings,
+        cameras: Mapping[str, RgbdCamera],
+        encoders: EncoderLink,
+        make_pipeline: MakePipeline,
+        composer: AnglesComposer,
+        outputs: Sequence[Output],
+        clock: ServiceClock,
+        make_alarm: Callable[[asyncio.AbstractEventLoop, Callable[[], None]], Alarm] = make_alarm,
+    ) -> None:
+        self._settings = settings
+        self._make_pipeline = make_pipeline
+        self._composer = composer
+        self._outputs = outputs
+        self._clock = clock
+        self._make_alarm = make_alarm
+        self._workers = {
+            name: CameraWorker(
+                name=name, camera=camera, observe=self._observe, listener=self, clock=clock, settings=settings.inputs
+            )
+            for name, camera in cameras.items()
+        }
+        self._encoder_worker = EncoderWorker(encoders, self, settings.inputs)
+        self._counters = {name: worker.counters for name, worker in self._workers.items()}
+        self._counters[ENCODERS] = self._encoder_worker.counters
+        self._pacer = Pacer(clock.now_ns, clock.monotonic_of, self._guarded_tick)
+        self._counts = SampleCounts()
+        self._infos: dict[str, CameraInfo] = {}
+        self._joints: tuple[str, ...] | None = None
+        self._pipeline: PipelineLike | None = None
+        self._first_capture_ns: dict[str, int] = {}
+        self._last_capture_ns: dict[str, int] = {}
+        self._ended: set[str] = set()
+        self._failure: BaseException | None = None
+        self._stopping = asyncio.Event()
+        self._alarm: Alarm | None = None
+        self._meter = HealthMeter(0)
+        self._health_due_ns = 0
+        self._told_status: Status | None = None
+        self._t_first_ns: int | None = None
+        self._t_last_ns = 0
+        self._event_seq = 0
+
+    def stop(self) -> None:
+        """End the run; call on the event loop's thread."""
+        self._stopping.set()
+
+    async def run(self) -> ServiceSummary:
+        """Run until stopped or until every input has ended.
+
+        Raises:
+            DeviceError: An input that is not opened again (a recording) broke.
+            GhestError: The pipeline cannot be built from what the devices say of themselves.
+        """
+        loop = asyncio.get_running_loop()
+        t_start_ns = self._clock.now_ns()
+        self._meter = HealthMeter(t_start_ns)
+        self._health_due_ns = t_start_ns + _HEALTH_PERIOD_NS
+        self._alarm = self._make_alarm(loop, self._pacer.wake)
+        encoder_task = asyncio.create_task(self._encoder_worker.run(), name="encoders")
+        try:
+            for worker in self._workers.values():
+                worker.start(loop)
+            self._event(EventKind.STARTED, "info", "service", f"publishing at {self._settings.rate_hz:g} Hz")
+            self._pacer.start(Grid(t_start_ns, self._settings.rate_hz), self._alarm)
+            await self._stopping.wait()
+        finally:
+            self._pacer.stop()
+            self._alarm.close()
+            await self._stop_inputs(encoder_task)
+        self._send_health(self._clock.now_ns())
+        self._event(EventKind.STOPPED, "info", "service", f"{self._counts.published} samples published")
+        if self._failure is not None:
+            raise self._failure
+        return self.summary()
+
+    def summary(self) -> ServiceSummary:
+        """Return what the run has come to so far."""
+        return ServiceSummary(
+            duration_s=(self._t_last_ns - self._t_first_ns) * 1e-9 if self._t_first_ns is not None else 0.0,
+            published=self._counts.published,
+            valid=self._counts.valid,
+            degraded=self._counts.degraded,
+            starting=self._counts.starting,
+            missed_ticks=self._pacer.missed,
+            lateness=lateness(self._pacer),
+            inputs=self._counters,
+        )
+
+    # What the workers tell (InputListener).
+
+    def input_event(self, source: str, kind: EventKind, severity: Severity, message: str) -> None:
+        """Publish what happened to an input."""
+        self._event(kind, severity, source, message)
+
+    def camera_connected(self, name: str, info: CameraInfo) -> None:
+        """Note a camera's facts; the pipeline is (re)built once every input is known."""
+        self._event(EventKind.INPUT_CONNECTED, "info", name, f"{info.model} {info.serial}")
+        known = self._infos.get(name)
+        self._infos[name] = info
+        if known is not None and not same_camera(known, info):
+            self._event(EventKind.INPUT_CHANGED, "warning", name, "the camera came back with another calibration")
+            self._pipeline = None
+        self._prepare()
+
+    def encoders_connected(self, info: EncoderInfo) -> None:
+        """Note the joints measured; the pipeline is (re)built once every input is known."""
+        self._event(EventKind.INPUT_CONNECTED, "info", ENCODERS, ", ".join(info.joint_names))
+        if self._joints is not None and self._joints != info.joint_names:
+            self._event(EventKind.INPUT_CHANGED, "warning", ENCODERS, "the link came back with other joints")
+            self._pipeline = None
+        self._joints = info.joint_names
+        self._prepare()
+
+    def observed(self, observation: MarkerObservation) -> None:
+        """Hand a marker to the pipeline; the grid is anchored at the first instant that every camera has seen."""
+        if self._pipeline is None:
+            return
+        self._add(observation)
+        self._last_capture_ns[observation.camera] = observation.t_capture_ns
+        if observation.camera not in self._first_capture_ns:
+            self._first_capture_ns[observation.camera] = observation.t_capture_ns
+            if len(self._first_capture_ns) == len(self._workers):
+                self._anchor(max(self._first_capture_ns.values()))
+
+    def encoder_sample(self, sample: EncoderSample) -> None:
+        """Hand an encoder sample to the pipeline."""
+        self._add(sample)
+
+    def input_ended(self, source: str, error: Exception | None) -> None:
+        """Note that an input is through; the service ends when all are, and every sample they allow is published."""
+        self._ended.add(source)
+        if error is not None:
+            self._fail(DeviceError(f"{source}: {error}"))
+        elif len(self._ended) == len(self._counters) and len(self._last_capture_ns) < len(self._workers):
+            self.stop()  # ended without a frame: there is nothing to wait for
+
+    # Inside.
+
+    def _observe(self, frame: RgbdFrame) -> MarkerObservation:
+        pipeline = self._pipeline
+        if pipeline is None:
+            raise RuntimeError("the pipeline is being rebuilt")
+        return pipeline.observe(frame)
+
+    def _add(self, item: MarkerObservation | EncoderSample) -> None:
+        if self._pipeline is not None:
+            try:
+                self._pipeline.add(item)
+            except Exception as error:
+                self._fail(error)
+
+    def _prepare(self) -> None:
+        if self._pipeline is None:
+            if self._joints is None or len(self._infos) < len(self._workers):
+                return
+            try:
+                self._pipeline = self._make_pipeline(dict(self._infos), self._joints)
+            except Exception as error:  # told to the user by whoever started the service
+                self._fail(error)
+                return
+        for worker in self._workers.values():
+            worker.go()
+        self._encoder_worker.go()
+
+    def _anchor(self, t_sample_ns: int) -> None:
+        if self._alarm is not None:
+            grid = Grid(t_sample_ns + self._settings.lag_ns, self._settings.rate_hz)
+            self._pacer.start(grid, self._alarm, first=max(0, grid.index_from(self._clock.now_ns())))
+
+    def _guarded_tick(self, k: int, t_tick_ns: int) -> None:
+        try:
+            self._tick(k, t_tick_ns)
+        except Exception as error:
+            _log.debug("tick %d failed", k, exc_info=True)
+            self._fail(error)
+
+    def _tick(self, k: int, t_tick_ns: int) -> None:
+        t_sample_ns = t_tick_ns - self._settings.lag_ns
+        if len(self._ended) == len(self._counters) and t_sample_ns > min(self._last_capture_ns.values(), default=0):
+            self.stop()
+            self._pacer.stop()
+            return
+        estimate = self._waiting(t_sample_ns) if self._pipeline is None else self._pipeline.estimate(t_sample_ns)
+        message = self._composer.compose(estimate, self._clock.now_ns())
+        for output in self._outputs:
+            output.angles(message, estimate)
+        self._counts.add(estimate.status, estimate.reason)
+        if self._t_first_ns is None:
+            self._t_first_ns = t_tick_ns
+        self._t_last_ns = t_tick_ns
+        if t_tick_ns >= self._health_due_ns:
+            self._health_due_ns += _HEALTH_PERIOD_NS * (1 + (t_tick_ns - self._health_due_ns) // _HEALTH_PERIOD_NS)
+            self._send_health(self._clock.now_ns())
+            if not gc.isenabled():
+                gc.collect(1)
+
+    def _waiting(self, t_sample_ns: int) -> GhEstimate:
+        """The estimate while not every input is connected: none, and which input is waited for."""
+        reason = Reason.STARTING
+        if self._counters[ENCODERS].state is InputState.LOST:
+            reason = Reason.ENCODERS_SILENT
+        for name, lost in (("r1", Reason.R1_NO_FRAMES), ("r0", Reason.R0_NO_FRAMES)):
+            if name in self._counters and self._counters[name].state is InputState.LOST:
+                reason = lost
+        return GhEstimate(t_sample_ns, Status.LOST, reason, None, None, None, None, None, {})
+
+    def _send_health(self, t_ns: int) -> None:
+        message = self._meter.measure(t_ns, self._composer.unix_ns(t_ns), self._counts, self._pacer, self._counters)
+        for output in self._outputs:
+            output.health(message)
+        if message.status is not self._told_status and message.reason is not Reason.STARTING:
+            self._told_status = message.status
+            severity: Severity = "warning" if message.status is Status.LOST else "info"
+            self._event(EventKind.STATUS_CHANGED, severity, "service", f"{message.status} ({message.reason})")
+
+    def _event(self, kind: EventKind, severity: Severity, source: str, text: str) -> None:
+        _log.log(_LEVELS[severity], "%s: %s: %s", source, kind.replace("_", " "), text)
+        t_ns = self._clock.now_ns()
+        message = Event(
+            seq=self._event_seq,
+            t_ns=t_ns,
+            t_unix_ns=self._composer.unix_ns(t_ns),
+            severity=severity,
+            kind=kind,
+            source=source,
+            message=text,
+        )
+        self._event_seq += 1
+        for output in self._outputs:
+            output.event(message)
+
+    def _fail(self, error: BaseException) -> None:
+        if self._failure is None:
+            self._failure = error
+        self.stop()
+
+    async def _stop_inputs(self, encoder_task: "asyncio.Task[None]") -> None:
+        for worker in self._workers.values():
+            worker.stop()
+        encoder_task.cancel()
+        waits = [asyncio.create_task(worker.finished.wait()) for worker in self._workers.values()]
+        _, late = await asyncio.wait([encoder_task, *waits], timeout=_STOP_TIMEOUT_S)
+        for task in late:
+            task.cancel()
+        if late:
+            _log.warning("a device did not close in %.1f s and is left behind", _STOP_TIMEOUT_S)
+            await asyncio.wait(late, timeout=0.1)
+
+
+def same_camera(a: CameraInfo, b: CameraInfo) -> bool:
+    """Return whether two descriptions of a camera give the same geometry."""
+    return (
+        a.color == b.color
+        and a.depth == b.depth
+        and a.depth_unit_m == b.depth_unit_m
+        and bool(np.array_equal(a.color_from_depth, b.color_from_depth))
+    )
