@@ -1,0 +1,139 @@
+"""One picture of a recording: what the cameras see, the angles beside the truth, and the error."""
+
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from ghest_drivers.samples import RgbdFrame
+from ghest_rt.errors import BadInputError, GhestError
+from ghest_rt.estimation.angles import Arm, clinical, euler_yxz
+from ghest_rt.estimation.pipeline import Method, Pipeline
+from ghest_rt.messages.results import MarkerObservation
+from ghest_rt.recording.reader import Recording
+from ghest_rt.studies.metrics import sample_error
+from ghest_rt.studies.score import JudgedRun, Progress, run_with_truth
+
+_COLORS = {"flexion": "#0072B2", "abduction": "#D55E00", "rotation": "#009E73"}  # Okabe-Ito, safe for colour-blind readers
+_AXIS_RGB = ((230, 60, 40), (40, 170, 60), (40, 90, 220))
+
+
+def draw_recording(path: Path, out: Path, method: Method | None = None, progress: Progress | None = None) -> None:
+    """Draw a recording with truth to a PNG, SVG or PDF file.
+
+    Raises:
+        BadInputError: The recording cannot be used, or `out` has an ending that cannot be drawn.
+        GhestError: Matplotlib is not installed.
+    """
+    if out.suffix.lower() not in {".png", ".svg", ".pdf"}:
+        raise BadInputError(f"{out}: pictures end in .png, .svg or .pdf")
+    try:
+        from matplotlib.figure import Figure  # noqa: PLC0415 - an extra, imported only when used
+    except ImportError as error:
+        raise GhestError("pictures need Matplotlib: install ghest-rt[plots]") from error
+    run = run_with_truth(path, method, progress=progress)
+    figure = Figure(figsize=(11.0, 8.2), layout="constrained")
+    grid = figure.add_gridspec(3, 2, height_ratios=(1.5, 1.1, 0.7))
+    for column, (camera, image) in enumerate(_annotated(run.recording, method).items()):
+        axes = figure.add_subplot(grid[0, column])
+        axes.imshow(image, interpolation="nearest")
+        marker = run.recording.station.config.cameras[camera].marker
+        axes.set_title(f"camera {camera}: marker {marker} with its estimated axes", fontsize=10)
+        axes.set_axis_off()
+    _draw_angles(figure.add_subplot(grid[1, :]), run)
+    _draw_error(figure.add_subplot(grid[2, :]), run)
+    figure.suptitle(f"{path.stem}, method {run.method}", fontsize=12)
+    figure.savefig(out, dpi=130)
+
+
+def _annotated(recording: Recording, method: Method | None) -> dict[str, NDArray[np.uint8]]:
+    """Return each camera's image near the middle of the recording, the marker's axes drawn on it, at least 480 px high."""
+    pipeline = Pipeline(recording.station, recording.camera_infos, recording.encoder_joints, method)
+    images: dict[str, NDArray[np.uint8]] = {}
+    for frame, observation in _middle_frames(recording, pipeline):
+        scale = max(1, 480 // frame.color_rgb.shape[0])
+        image = np.ascontiguousarray(np.kron(frame.color_rgb, np.ones((scale, scale, 1), np.uint8)))
+        if observation.camera_from_marker is not None:
+            side_m = recording.station.config.markers[observation.marker].half_spacing_m
+            _draw_axes(image, frame, observation.camera_from_marker, side_m, scale)
+        images[frame.info.name] = image
+    return images
+
+
+def _middle_frames(recording: Recording, pipeline: Pipeline) -> Iterator[tuple[RgbdFrame, MarkerObservation]]:
+    middle_ns: int | None = None
+    done: set[str] = set()
+    for event in recording.events():
+        if not isinstance(event, RgbdFrame) or event.info.name in done:
+            continue
+        if middle_ns is None:
+            middle_ns = event.t_arrival_ns + recording.duration_ns // 2
+        if event.t_arrival_ns >= middle_ns:
+            done.add(event.info.name)
+            yield event, pipeline.observe(event)
+        if len(done) == len(pipeline.cameras):
+            return
+
+
+def _draw_axes(
+    image: NDArray[np.uint8], frame: RgbdFrame, camera_from_marker: NDArray[np.float64], side_m: float, scale: int
+) -> None:
+    rotation_vector, _ = cv2.Rodrigues(camera_from_marker[:3, :3])
+    points_m = np.vstack([np.zeros(3), side_m * np.eye(3)])
+    intrinsics = frame.info.color
+    pixels, _ = cv2.projectPoints(
+        points_m, rotation_vector, camera_from_marker[:3, 3], intrinsics.matrix, np.array(intrinsics.distortion)
+    )
+    origin, *tips = [tuple(int(v) for v in np.round((p[0] + 0.5) * scale - 0.5)) for p in pixels]
+    for tip, color in zip(tips, _AXIS_RGB, strict=True):
+        cv2.arrowedLine(
+            image, origin, tip, color, thickness=max(2, image.shape[0] // 200), line_type=cv2.LINE_AA, tipLength=0.15
+        )
+
+
+def _draw_angles(axes: Any, run: JudgedRun) -> None:
+    arm = run.recording.station.config.station.arm
+    t_0_ns = run.estimates[0].t_sample_ns if run.estimates else 0
+    estimated, true = [], []
+    for estimate in run.estimates:
+        seconds = (estimate.t_sample_ns - t_0_ns) * 1e-9
+        truth = run.truth.at(estimate.t_sample_ns)
+        estimated.append((seconds, *_angles_deg(estimate.gh_from_arm, arm)))
+        true.append((seconds, *_angles_deg(truth.gh_from_arm if truth is not None else None, arm)))
+    for column, (name, color) in enumerate(_COLORS.items(), start=1):
+        axes.plot(*_columns(true, column), color="0.78", linewidth=4.5, label="truth" if column == len(_COLORS) else None)
+        axes.plot(*_columns(estimated, column), color=color, linewidth=1.2, label=name)
+    axes.set_ylabel("GH angle (deg)")
+    axes.legend(ncols=4, fontsize=9, loc="upper right")
+    axes.grid(alpha=0.3)
+
+
+def _angles_deg(gh_from_arm: NDArray[np.float64] | None, arm: Arm) -> tuple[float, float, float]:
+    if gh_from_arm is None:
+        return math.nan, math.nan, math.nan
+    angles = clinical(euler_yxz(gh_from_arm), arm)
+    return math.degrees(angles.flexion_rad), math.degrees(angles.abduction_rad), math.degrees(angles.rotation_rad)
+
+
+def _columns(rows: list[tuple[float, float, float, float]], column: int) -> tuple[list[float], list[float]]:
+    return [row[0] for row in rows], [row[column] for row in rows]
+
+
+def _draw_error(axes: Any, run: JudgedRun) -> None:
+    t_0_ns = run.estimates[0].t_sample_ns if run.estimates else 0
+    points = []
+    for estimate in run.estimates:
+        truth = run.truth.at(estimate.t_sample_ns)
+        error = sample_error(estimate, truth) if truth is not None else None
+        points.append(
+            ((estimate.t_sample_ns - t_0_ns) * 1e-9, math.nan if error is None else math.degrees(error.orientation_rad))
+        )
+    axes.plot([s for s, _ in points], [e for _, e in points], color="0.2", linewidth=0.9)
+    axes.set_ylabel("orientation\nerror (deg)")
+    axes.set_xlabel("time (s)")
+    axes.set_ylim(bottom=0.0)
+    axes.grid(alpha=0.3)

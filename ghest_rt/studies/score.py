@@ -1,0 +1,117 @@
+"""Run a recording through a method and compare with its truth."""
+
+import math
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from ghest_rt.config.load import LoadedStation
+from ghest_rt.errors import BadInputError
+from ghest_rt.estimation.offline import estimate_events
+from ghest_rt.estimation.pipeline import Method, Pipeline
+from ghest_rt.messages.results import GhEstimate, TruthSample
+from ghest_rt.recording.reader import Recording
+from ghest_rt.studies.metrics import ErrorAccumulator
+from ghest_rt.studies.truth import TruthTrack
+
+Progress = Callable[[float], None]
+
+
+@dataclass(frozen=True, slots=True)
+class RecordingScore:
+    """The paper's metrics (3.4.2) of one recording and method.
+
+    Attributes:
+        recording: The file.
+        method: The method judged.
+        orientation_rmse_deg: RMS of the norm of the exponential map of the arm's orientation error in the m0 frame.
+        position_rmse_m: RMS distance between true and estimated arm position in the m0 frame.
+        m0_rmse_m: RMS distance between true and estimated position of marker m0 in the exoskeleton base frame.
+        m1_rmse_m: The same of marker m1.
+        samples: Instants of the grid.
+        valid_fraction: Share of them with status `valid`.
+        skipped: What of the recording could not be used.
+    """
+
+    recording: str
+    method: str
+    orientation_rmse_deg: float
+    position_rmse_m: float
+    m0_rmse_m: float
+    m1_rmse_m: float
+    samples: int
+    valid_fraction: float
+    skipped: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class JudgedRun:
+    """A recording's estimates beside its truth."""
+
+    recording: Recording
+    method: str
+    estimates: list[GhEstimate]
+    truth: TruthTrack
+
+
+def run_with_truth(
+    path: Path, method: Method | None = None, station: LoadedStation | None = None, progress: Progress | None = None
+) -> JudgedRun:
+    """Estimate every grid instant of a recording that carries truth.
+
+    Args:
+        path: The recording.
+        method: None for the station's.
+        station: Takes the place of the station in the recording.
+        progress: Told the share done, 0 to 1.
+
+    Raises:
+        BadInputError: The recording cannot be used, or has no truth.
+    """
+    recording = Recording(path)
+    if not recording.has_truth:
+        raise BadInputError(
+            f"{path}: no topic /truth/state, so there is nothing to compare with; `ghest-rt estimate` needs none"
+        )
+    truth = TruthTrack()
+    pipeline = Pipeline(station or recording.station, recording.camera_infos, recording.encoder_joints, method)
+
+    def events() -> Iterator[object]:
+        yield from _keep_truth(recording.events(), truth)
+
+    estimates: list[GhEstimate] = []
+    for estimate in estimate_events(events(), pipeline):
+        estimates.append(estimate)
+        if progress is not None and len(estimates) % 20 == 0:
+            progress(min(1.0, (estimate.t_sample_ns - estimates[0].t_sample_ns) / max(recording.duration_ns, 1)))
+    return JudgedRun(recording, pipeline.method, estimates, truth)
+
+
+def score_recording(
+    path: Path, method: Method | None = None, station: LoadedStation | None = None, progress: Progress | None = None
+) -> RecordingScore:
+    """Score one recording; arguments and errors as of `run_with_truth`."""
+    run = run_with_truth(path, method, station, progress)
+    errors = ErrorAccumulator()
+    for estimate in run.estimates:
+        errors.add(estimate, run.truth.at(estimate.t_sample_ns))
+    rms = errors.rms()
+    return RecordingScore(
+        recording=str(path),
+        method=run.method,
+        orientation_rmse_deg=math.degrees(rms.orientation_rad),
+        position_rmse_m=rms.position_m,
+        m0_rmse_m=rms.m0_m,
+        m1_rmse_m=rms.m1_m,
+        samples=errors.samples,
+        valid_fraction=errors.valid_fraction,
+        skipped=tuple(str(problem) for problem in run.recording.problems),
+    )
+
+
+def _keep_truth(events: Iterable[object], truth: TruthTrack) -> Iterator[object]:
+    for event in events:
+        if isinstance(event, TruthSample):
+            truth.add(event)
+        else:
+            yield event
