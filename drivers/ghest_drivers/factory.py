@@ -1,0 +1,85 @@
+"""Backends by name. A backend's module, and with it its vendor library, is imported only when it is chosen.
+
+A further backend is one more line in a table: the module and the callable that makes the device, called with keywords
+(`clock`, for cameras also `name`, and the backend's own settings), and the extra of ghest-rt that brings its library.
+"""
+
+import importlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from ghest_drivers.clock import Clock
+from ghest_drivers.errors import DeviceNotFound
+from ghest_drivers.interfaces import EncoderLink, RgbdCamera
+
+
+@dataclass(frozen=True, slots=True)
+class Backend:
+    """Where a backend is.
+
+    Attributes:
+        module: Its module's dotted path.
+        maker: The callable in it.
+        extra: The extra of ghest-rt that installs what it needs; "" if nothing.
+    """
+
+    module: str
+    maker: str
+    extra: str = ""
+
+
+CAMERAS: dict[str, Backend] = {
+    "sim": Backend("ghest_drivers.sim", "SimCamera", "sim"),
+}
+ENCODERS: dict[str, Backend] = {
+    "sim": Backend("ghest_drivers.sim", "SimEncoders", "sim"),
+}
+
+
+def make_camera(backend: str, name: str, clock: Clock, settings: Mapping[str, object]) -> RgbdCamera:
+    """Make a camera, not yet open.
+
+    Args:
+        backend: A name in `CAMERAS`.
+        name: The camera's name in the station file.
+        clock: Host clock.
+        settings: The backend's own keyword arguments.
+
+    Raises:
+        DeviceNotFound: No such backend, or its library is not installed: names the extra to install.
+        TypeError: The backend does not know a setting.
+    """
+    camera = _make("camera", CAMERAS, backend, {**settings, "name": name, "clock": clock})
+    if not isinstance(camera, RgbdCamera):
+        raise TypeError(f"camera backend {backend} made a {type(camera).__name__}, which is no RgbdCamera")
+    return camera
+
+
+def make_encoders(backend: str, clock: Clock, settings: Mapping[str, object]) -> EncoderLink:
+    """Make an encoder link, not yet open.
+
+    Args:
+        backend: A name in `ENCODERS`.
+        clock: Host clock.
+        settings: The backend's own keyword arguments.
+
+    Raises:
+        DeviceNotFound: No such backend, or its library is not installed: names the extra to install.
+        TypeError: The backend does not know a setting.
+    """
+    encoders = _make("encoder", ENCODERS, backend, {**settings, "clock": clock})
+    if not isinstance(encoders, EncoderLink):
+        raise TypeError(f"encoder backend {backend} made a {type(encoders).__name__}, which is no EncoderLink")
+    return encoders
+
+
+def _make(what: str, table: Mapping[str, Backend], name: str, arguments: Mapping[str, object]) -> object:
+    backend = table.get(name)
+    if backend is None:
+        raise DeviceNotFound(f"no {what} backend {name!r}; there are {', '.join(sorted(table))}")
+    try:
+        module = importlib.import_module(backend.module)
+    except ImportError as error:
+        remedy = f"install ghest-rt[{backend.extra}]" if backend.extra else "install ghest-rt again"
+        raise DeviceNotFound(f"{what} backend {name} lacks a library ({error}): {remedy}") from error
+    return getattr(module, backend.maker)(**arguments)
