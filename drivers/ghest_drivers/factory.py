@@ -7,6 +7,7 @@ A further backend is one more line in a table: the module and the callable that 
 import importlib
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from ghest_drivers.clock import Clock
 from ghest_drivers.errors import DeviceNotFound
@@ -49,9 +50,7 @@ def make_camera(backend: str, name: str, clock: Clock, settings: Mapping[str, ob
         DeviceNotFound: No such backend, or its library is not installed: names the extra to install.
         TypeError: The backend does not know a setting.
     """
-    camera = _make("camera", CAMERAS, backend, {**settings, "name": name, "clock": clock})
-    if not isinstance(camera, RgbdCamera):
-        raise TypeError(f"camera backend {backend} made a {type(camera).__name__}, which is no RgbdCamera")
+    camera: RgbdCamera = _make("camera", CAMERAS, backend, {**settings, "name": name, "clock": clock})
     return camera
 
 
@@ -67,13 +66,11 @@ def make_encoders(backend: str, clock: Clock, settings: Mapping[str, object]) ->
         DeviceNotFound: No such backend, or its library is not installed: names the extra to install.
         TypeError: The backend does not know a setting.
     """
-    encoders = _make("encoder", ENCODERS, backend, {**settings, "clock": clock})
-    if not isinstance(encoders, EncoderLink):
-        raise TypeError(f"encoder backend {backend} made a {type(encoders).__name__}, which is no EncoderLink")
+    encoders: EncoderLink = _make("encoder", ENCODERS, backend, {**settings, "clock": clock})
     return encoders
 
 
-def _make(what: str, table: Mapping[str, Backend], name: str, arguments: Mapping[str, object]) -> object:
+def _make(what: str, table: Mapping[str, Backend], name: str, arguments: Mapping[str, object]) -> Any:
     backend = table.get(name)
     if backend is None:
         raise DeviceNotFound(f"no {what} backend {name!r}; there are {', '.join(sorted(table))}")
