@@ -57,7 +57,8 @@ def estimate_events(
     """Yield the estimates on the absolute grid t_k = t_0 + round(k * 1e9 / rate).
 
     t_0 is the capture time of the first frame with which both cameras have been seen. An instant t_k is estimated from what had
-    arrived by t_k + lag, as it is live; the last ones, from all there is. The grid ends with the last frame.
+    arrived by t_k + lag, as it is live; the last ones, up to the last frame, from all there is. If the encoders go on
+    alone after that, so does the grid, without angles.
 
     Args:
         events: `RgbdFrame` and `EncoderSample` in the order of arrival; anything else is passed over.
