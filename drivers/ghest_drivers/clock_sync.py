@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 _NS_PER_S = 1_000_000_000
+_SETTLE_NS = _NS_PER_S  # until then a faster probe moves the map at once: the first may have been very slow
 
 
 class ProbeVerdict(StrEnum):
@@ -53,8 +54,8 @@ def wrap_period_ns(bits: int, tick_ns: int) -> int:
 class ClockMap:
     """Maps one device clock to host monotonic time. Not thread-safe: one thread feeds and asks it.
 
-    The map never runs backwards while the fit improves: corrections are spread over time (`slew`), except after
-    a step. It needs one `update` before the first `to_host_ns`.
+    Corrections are spread over time (`slew`), so that the map never runs backwards, except in the first second and after
+    a step, when they are made at once. It needs one `update` before the first `to_host_ns`.
 
     Args:
         wrap_ns: Device times are counted modulo this; None if they never wrap. See `wrap_period_ns`.
@@ -97,6 +98,7 @@ class ClockMap:
         self._buckets: deque[tuple[int, int]] = deque()  # closed: fastest (unwrapped device time, arrival) of each
         self._best: tuple[int, int] | None = None  # of the open bucket
         self._bucket_start_ns = 0
+        self._started_ns = 0
         self._origin: tuple[int, int] | None = None  # a point on the fitted line
         self._drift = 0.0  # slope - 1
         self._correction_ns = 0.0  # applied map = fitted line + this; slewed to zero
@@ -153,6 +155,18 @@ class ClockMap:
             return None
         return min(self.to_host_ns(t_device_ns), t_arrival_ns - self._latency_ns)
 
+    def foresee(self, t_device_ns: int, t_arrival_ns: int) -> None:
+        """Take note that a later sample of the same delivery is already here, before those ahead of it are taken in.
+
+        The last of a burst is the least late of it: knowing it first places the others rightly, where the fit is still young.
+        """
+        if self._origin is None:
+            return
+        device_ns = self._unwrap(t_device_ns, self._last[0] + t_arrival_ns - self._last[1])
+        late_ns = t_arrival_ns - self._line_ns(device_ns)
+        if device_ns - self._started_ns <= _SETTLE_NS and -self._step_ns <= late_ns < 0:
+            self._origin = (self._origin[0], self._origin[1] + late_ns)
+
     def _unwrap(self, t_device_ns: int, near_ns: int) -> int:
         if self._wrap_ns is None:
             return t_device_ns
@@ -171,7 +185,7 @@ class ClockMap:
         self._drift = 0.0
         self._correction_ns = 0.0
         self._origin = min(probes, key=lambda probe: probe[1] - probe[0])
-        self._bucket_start_ns = probes[0][0]
+        self._bucket_start_ns = self._started_ns = probes[0][0]
         self._doubt.clear()
         self._late.clear()
         for probe in probes:
@@ -181,7 +195,8 @@ class ClockMap:
         """Let a believed probe take part in the fit."""
         if late_ns < 0 and self._origin is not None:  # faster than any before: the line must go below it at once
             self._origin = (self._origin[0], self._origin[1] + late_ns)
-            self._correction_ns -= late_ns
+            if probe[0] - self._started_ns > _SETTLE_NS:
+                self._correction_ns -= late_ns
         if probe[0] - self._bucket_start_ns >= self._bucket_ns and self._best is not None:
             self._close_bucket(probe[0])
         if self._best is None or max(late_ns, 0) < self._best[1] - self._line_ns(self._best[0]):

@@ -63,6 +63,16 @@ class SampleBuilder:
         self._stats.accepted += 1
         return result
 
+    def places_bursts(self, last: RawReading, t_arrival_ns: int) -> bool:
+        """Whether several readings that arrive at once, up to `last`, can each be placed in time. To be asked before `build`.
+
+        Without a device time they cannot, nor right after opening, when nothing tells how late the first of them is.
+        """
+        if last.ticks is None or self._counting.tick_ns is None or not self.clock.ready:
+            return False
+        self.clock.foresee(last.ticks * self._counting.tick_ns, t_arrival_ns)
+        return True
+
     def _judge(self, reading: RawReading, t_arrival_ns: int, t_first_ns: int) -> EncoderSample | Rejection:
         if self._counted_before(reading):
             return Rejection.DUPLICATE

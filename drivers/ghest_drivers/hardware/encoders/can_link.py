@@ -53,7 +53,10 @@ class CanEncoderLink(SampleQueueLink):
     async def _connect(self) -> None:
         self._decoder = CanDecoder(self._settings.layout, self._channels, self.stats)
         bus = await asyncio.to_thread(open_bus, self._settings.bus)
-        bus.set_filters([{"can_id": key, "can_mask": 0x1FFFFFFF, "extended": key > 0x7FF} for key in self._decoder.frame_ids])
+        if self._settings.bus.interface == "socketcan":
+            # Filtered in the kernel, which lets error frames pass; python-can's own filters would drop them.
+            ids = self._decoder.frame_ids
+            bus.set_filters([{"can_id": key, "can_mask": 0x1FFFFFFF, "extended": key > 0x7FF} for key in ids])
         handoff = Handoff(asyncio.get_running_loop(), self._received, self.stats)
         self._receiver = CanReceiver(self._name, bus, self._clock, self.stats, handoff=handoff, fail=self._fail)
         self._receiver.start()

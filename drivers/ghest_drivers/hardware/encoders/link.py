@@ -124,7 +124,7 @@ class SampleQueueLink:
         """Queue what was received at one instant (its first part at `t_first_ns`); on the event loop's thread."""
         if not readings:
             return
-        if self._counting.tick_ns is None and len(readings) > 1:
+        if len(readings) > 1 and not self._builder.places_bursts(readings[-1], t_arrival_ns):
             self.stats.rejected[Rejection.SUPERSEDED] += len(readings) - 1
             readings = readings[-1:]
         for reading in readings:

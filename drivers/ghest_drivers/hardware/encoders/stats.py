@@ -18,7 +18,7 @@ class Rejection(StrEnum):
     DUPLICATE = "duplicate"  # the same reading once more
     CLOCK_SUSPECT = "clock_suspect"  # the device time contradicts all before it
     NOT_ADVANCING = "not_advancing"  # not later than the sample before
-    SUPERSEDED = "superseded"  # without a device time, only the last of a burst can be placed in time
+    SUPERSEDED = "superseded"  # of a burst without a device time, or right after opening, only the last can be placed in time
     NOT_FINITE = "not_finite"
     OUT_OF_RANGE = "out_of_range"  # beyond the joint's limits
     TOO_FAST = "too_fast"  # no joint can have moved so far since the last accepted sample
