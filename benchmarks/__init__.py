@@ -1,0 +1,1 @@
+"""Benchmarks: `python -m benchmarks.run`. Kept apart from the tests."""
