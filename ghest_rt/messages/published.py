@@ -139,7 +139,7 @@ class EventKind(StrEnum):
     STOPPED = "stopped"
     INPUT_CONNECTED = "input_connected"
     INPUT_SILENT = "input_silent"
-    INPUT_BACK = "input_back"
+    INPUT_STREAMING = "input_streaming"
     INPUT_LOST = "input_lost"
     INPUT_ENDED = "input_ended"
     INPUT_CHANGED = "input_changed"

@@ -123,7 +123,7 @@ class CameraWorker:
             in_vain = 0
             if counters.state is not InputState.STREAMING:
                 counters.state = InputState.STREAMING
-                self._event(EventKind.INPUT_BACK, "info", "frames are arriving")
+                self._event(EventKind.INPUT_STREAMING, "info", "frames are arriving")
             try:
                 observation = self._observe(frame)
             except Exception as error:  # one frame that vision cannot digest must not silence the camera

@@ -1,6 +1,7 @@
 """From an estimate (radians, metres) to the message published (degrees, ages)."""
 
 import math
+from typing import Literal
 
 from ghest_rt.estimation.angles import Arm, clinical, euler_yxz
 from ghest_rt.estimation.isb import isb_yxy
@@ -31,10 +32,23 @@ def clinical_deg(gh_from_arm: Array, arm: Arm) -> Clinical:
     )
 
 
-class AnglesComposer:
-    """Numbers the samples and fills in what every message of a run has in common."""
+class Numbering:
+    """Sequence numbers of the messages of one process, per kind; runs of the service one after the other share it."""
 
-    def __init__(self, arm: Arm, method: str, calibration_id: str, unix_offset_ns: int, first_seq: int = 0) -> None:
+    def __init__(self) -> None:
+        self._next = dict.fromkeys(("angles", "health", "events"), 0)
+
+    def take(self, kind: Literal["angles", "health", "events"]) -> int:
+        """Return the next number of a kind of message."""
+        seq = self._next[kind]
+        self._next[kind] += 1
+        return seq
+
+
+class AnglesComposer:
+    """Fills in what every message of a run has in common."""
+
+    def __init__(self, arm: Arm, method: str, calibration_id: str, unix_offset_ns: int, numbering: Numbering) -> None:
         """Prepare the run.
 
         Args:
@@ -42,9 +56,9 @@ class AnglesComposer:
             method: Name of the estimation method.
             calibration_id: From the station file.
             unix_offset_ns: Unix time minus the service's clock.
-            first_seq: Number of the first sample.
+            numbering: Where the sequence numbers come from.
         """
-        self.next_seq = first_seq
+        self.numbering = numbering
         self._arm: Arm = arm
         self._method = method
         self._calibration_id = calibration_id
@@ -56,11 +70,9 @@ class AnglesComposer:
 
     def compose(self, estimate: GhEstimate, t_publish_ns: int) -> GhAngles:
         """Return the message for an estimate about to be published at `t_publish_ns`."""
-        seq = self.next_seq
-        self.next_seq += 1
         R, newest_ns = estimate.gh_from_arm, estimate.newest_ns
         common = {
-            "seq": seq,
+            "seq": self.numbering.take("angles"),
             "t_sample_ns": estimate.t_sample_ns,
             "t_publish_ns": t_publish_ns,
             "t_sample_unix_ns": self.unix_ns(estimate.t_sample_ns),

@@ -86,7 +86,7 @@ class EncoderWorker:
             counters.count(sample.seq)
             if counters.state is not InputState.STREAMING:
                 counters.state = InputState.STREAMING
-                self._event(EventKind.INPUT_BACK, "info", "samples are arriving")
+                self._event(EventKind.INPUT_STREAMING, "info", "samples are arriving")
             self._listener.encoder_sample(sample)
 
     def _event(self, kind: EventKind, severity: Severity, message: str) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from ghest_rt.messages.published import Health, InputHealth, Lateness
-from ghest_rt.messages.results import Reason, Status
+from ghest_rt.messages.results import GhEstimate, Reason, Status
 from ghest_rt.service.inputs import InputCounters
 from ghest_rt.service.pacing import Pacer
 
@@ -30,38 +30,50 @@ class SampleCounts:
         self.valid = 0
         self.degraded = 0
         self.starting = 0
+        self._t_first_ns: int | None = None
+        self._t_last_ns = 0
         self.status = Status.LOST
         self.reason = Reason.STARTING
 
-    def add(self, status: Status, reason: Reason) -> None:
+    def add(self, estimate: GhEstimate) -> None:
         """Count one published sample."""
         self.published += 1
-        self.valid += status is Status.VALID
-        self.degraded += status is Status.DEGRADED
-        self.starting += reason is Reason.STARTING
-        self.status, self.reason = status, reason
+        self.valid += estimate.status is Status.VALID
+        self.degraded += estimate.status is Status.DEGRADED
+        self.starting += estimate.reason is Reason.STARTING
+        self.status, self.reason = estimate.status, estimate.reason
+        if estimate.reason is not Reason.STARTING:
+            if self._t_first_ns is None:
+                self._t_first_ns = estimate.t_sample_ns
+            self._t_last_ns = estimate.t_sample_ns
+
+    @property
+    def duration_s(self) -> float:
+        """From the instant of the first sample after the start to that of the last one."""
+        return 0.0 if self._t_first_ns is None else (self._t_last_ns - self._t_first_ns) * 1e-9
 
 
 class HealthMeter:
     """Makes Health messages; rates hold for the time since the message before."""
 
-    def __init__(self, t_start_ns: int) -> None:
+    def __init__(self, t_start_ns: int, counts: SampleCounts, pacer: Pacer, inputs: Mapping[str, InputCounters]) -> None:
+        self._counts = counts
+        self._pacer = pacer
+        self._inputs = inputs
         self._t_start_ns = t_start_ns
         self._t_last_ns = t_start_ns
         self._cpu_last_s = time.process_time()
         self._wall_last_s = time.monotonic()
         self._published_last = 0
         self._received_last: dict[str, int] = {}
-        self._seq = 0
 
-    def measure(
-        self, t_ns: int, t_unix_ns: int, counts: SampleCounts, pacer: Pacer, inputs: Mapping[str, InputCounters]
-    ) -> Health:
-        """Return the state at `t_ns` (service clock)."""
+    def measure(self, seq: int, t_ns: int, t_unix_ns: int) -> Health:
+        """Return message number `seq`, the state at `t_ns` (service clock)."""
+        counts, pacer = self._counts, self._pacer
         elapsed_s = max((t_ns - self._t_last_ns) * 1e-9, 1e-9)
         cpu_s, wall_s = time.process_time(), time.monotonic()
         message = Health(
-            seq=self._seq,
+            seq=seq,
             t_ns=t_ns,
             t_unix_ns=t_unix_ns,
             uptime_s=(t_ns - self._t_start_ns) * 1e-9,
@@ -72,11 +84,10 @@ class HealthMeter:
             rate_hz=(counts.published - self._published_last) / elapsed_s,
             missed_ticks=pacer.missed,
             lateness=lateness(pacer),
-            inputs={name: self._input(name, counters, elapsed_s) for name, counters in inputs.items()},
+            inputs={name: self._input(name, counters, elapsed_s) for name, counters in self._inputs.items()},
             cpu_percent=100.0 * (cpu_s - self._cpu_last_s) / max(wall_s - self._wall_last_s, 1e-9),
             memory_mb=resident_mb(),
         )
-        self._seq += 1
         self._t_last_ns, self._cpu_last_s, self._wall_last_s = t_ns, cpu_s, wall_s
         self._published_last = counts.published
         return message

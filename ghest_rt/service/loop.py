@@ -4,7 +4,7 @@ import asyncio
 import gc
 import logging
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
@@ -29,6 +29,7 @@ _log = logging.getLogger(__name__)
 
 _STOP_TIMEOUT_S = 0.7  # SIGTERM must end the service within a second, even if a device hangs in its close
 _HEALTH_PERIOD_NS = 1_000_000_000
+_ABSENT = ((ENCODERS, Reason.ENCODERS_SILENT), ("r0", Reason.R0_NO_FRAMES), ("r1", Reason.R1_NO_FRAMES))
 _LEVELS = {"info": logging.INFO, "warning": logging.WARNING, "error": logging.ERROR}
 
 
@@ -71,7 +72,7 @@ class ServiceSummary:
     """What a run of the service came to.
 
     Attributes:
-        duration_s: On the service's clock, between the first and the last tick.
+        duration_s: From the instant of the first sample after the start to that of the last one, on the service's clock.
         published: Samples published.
         valid: Of these with status valid.
         degraded: Of these with status degraded.
@@ -128,16 +129,14 @@ class Service:
         self._pipeline: PipelineLike | None = None
         self._first_capture_ns: dict[str, int] = {}
         self._last_capture_ns: dict[str, int] = {}
+        self._anchor_ns: int | None = None
         self._ended: set[str] = set()
         self._failure: BaseException | None = None
         self._stopping = asyncio.Event()
         self._alarm: Alarm | None = None
-        self._meter = HealthMeter(0)
+        self._meter = HealthMeter(0, self._counts, self._pacer, self._counters)
         self._health_due_ns = 0
         self._told_status: Status | None = None
-        self._t_first_ns: int | None = None
-        self._t_last_ns = 0
-        self._event_seq = 0
 
     def stop(self) -> None:
         """End the run; call on the event loop's thread."""
@@ -152,7 +151,7 @@ class Service:
         """
         loop = asyncio.get_running_loop()
         t_start_ns = self._clock.now_ns()
-        self._meter = HealthMeter(t_start_ns)
+        self._meter = HealthMeter(t_start_ns, self._counts, self._pacer, self._counters)
         self._health_due_ns = t_start_ns + _HEALTH_PERIOD_NS
         self._alarm = self._make_alarm(loop, self._pacer.wake)
         encoder_task = asyncio.create_task(self._encoder_worker.run(), name="encoders")
@@ -175,7 +174,7 @@ class Service:
     def summary(self) -> ServiceSummary:
         """Return what the run has come to so far."""
         return ServiceSummary(
-            duration_s=(self._t_last_ns - self._t_first_ns) * 1e-9 if self._t_first_ns is not None else 0.0,
+            duration_s=self._counts.duration_s,
             published=self._counts.published,
             valid=self._counts.valid,
             degraded=self._counts.degraded,
@@ -263,8 +262,9 @@ class Service:
 
     def _anchor(self, t_sample_ns: int) -> None:
         if self._alarm is not None:
+            self._anchor_ns = t_sample_ns
             grid = Grid(t_sample_ns + self._settings.lag_ns, self._settings.rate_hz)
-            self._pacer.start(grid, self._alarm, first=max(0, grid.index_from(self._clock.now_ns())))
+            self._pacer.start(grid, self._alarm, first=grid.index_from(self._clock.now_ns()))
 
     def _guarded_tick(self, k: int, t_tick_ns: int) -> None:
         try:
@@ -275,18 +275,21 @@ class Service:
 
     def _tick(self, k: int, t_tick_ns: int) -> None:
         t_sample_ns = t_tick_ns - self._settings.lag_ns
-        if len(self._ended) == len(self._counters) and t_sample_ns > min(self._last_capture_ns.values(), default=0):
+        all_ended = len(self._ended) == len(self._counters)
+        if all_ended and t_sample_ns > max(self._last_capture_ns.values(), default=0):
             self.stop()
             self._pacer.stop()
             return
-        estimate = self._waiting(t_sample_ns) if self._pipeline is None else self._pipeline.estimate(t_sample_ns)
+        if self._pipeline is None or self._anchor_ns is None or t_sample_ns < self._anchor_ns:
+            estimate = self._waiting(t_sample_ns)
+        else:
+            estimate = self._pipeline.estimate(t_sample_ns)
+        if all_ended and estimate.status is Status.LOST:
+            estimate = replace(estimate, reason=Reason.END_OF_RECORDING)
         message = self._composer.compose(estimate, self._clock.now_ns())
         for output in self._outputs:
             output.angles(message, estimate)
-        self._counts.add(estimate.status, estimate.reason)
-        if self._t_first_ns is None:
-            self._t_first_ns = t_tick_ns
-        self._t_last_ns = t_tick_ns
+        self._counts.add(estimate)
         if t_tick_ns >= self._health_due_ns:
             self._health_due_ns += _HEALTH_PERIOD_NS * (1 + (t_tick_ns - self._health_due_ns) // _HEALTH_PERIOD_NS)
             self._send_health(self._clock.now_ns())
@@ -294,17 +297,14 @@ class Service:
                 gc.collect(1)
 
     def _waiting(self, t_sample_ns: int) -> GhEstimate:
-        """The estimate while not every input is connected: none, and which input is waited for."""
-        reason = Reason.STARTING
-        if self._counters[ENCODERS].state is InputState.LOST:
-            reason = Reason.ENCODERS_SILENT
-        for name, lost in (("r1", Reason.R1_NO_FRAMES), ("r0", Reason.R0_NO_FRAMES)):
-            if name in self._counters and self._counters[name].state is InputState.LOST:
-                reason = lost
-        return GhEstimate(t_sample_ns, Status.LOST, reason, None, None, None, None, None, {})
+        """The estimate until every camera has delivered: none, and which input is waited for."""
+        absent = (reason for name, reason in _ABSENT if self._counters[name].state in (InputState.LOST, InputState.SILENT))
+        reason = next(absent, Reason.STARTING)
+        return GhEstimate(t_sample_ns, Status.LOST, reason, None, None, None, None, None, dict(self._last_capture_ns))
 
     def _send_health(self, t_ns: int) -> None:
-        message = self._meter.measure(t_ns, self._composer.unix_ns(t_ns), self._counts, self._pacer, self._counters)
+        composer = self._composer
+        message = self._meter.measure(composer.numbering.take("health"), t_ns, composer.unix_ns(t_ns))
         for output in self._outputs:
             output.health(message)
         if message.status is not self._told_status and message.reason is not Reason.STARTING:
@@ -316,7 +316,7 @@ class Service:
         _log.log(_LEVELS[severity], "%s: %s: %s", source, kind.replace("_", " "), text)
         t_ns = self._clock.now_ns()
         message = Event(
-            seq=self._event_seq,
+            seq=self._composer.numbering.take("events"),
             t_ns=t_ns,
             t_unix_ns=self._composer.unix_ns(t_ns),
             severity=severity,
@@ -324,7 +324,6 @@ class Service:
             source=source,
             message=text,
         )
-        self._event_seq += 1
         for output in self._outputs:
             output.event(message)
 

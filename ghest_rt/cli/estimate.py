@@ -1,0 +1,59 @@
+"""`ghest-rt estimate`: a recording to a table, as fast as the machine allows."""
+
+import logging
+from pathlib import Path
+
+from rich.console import Console
+from rich.progress import Progress
+
+from ghest_rt.cli.console import print_json
+from ghest_rt.cli.options import Method
+from ghest_rt.cli.table_file import Row, row_of, write_table, writer_for
+from ghest_rt.config.load import load_station
+from ghest_rt.estimation.offline import estimate_events
+from ghest_rt.estimation.pipeline import Pipeline
+from ghest_rt.messages.results import Status
+from ghest_rt.recording.reader import Recording
+
+_log = logging.getLogger(__name__)
+
+
+def estimate(path: Path, method: Method | None, out: Path, station_file: Path | None, as_json: bool) -> None:
+    """Estimate every grid instant of a recording and write the table.
+
+    Raises:
+        BadInputError: The recording, the station file or the output file cannot be used.
+    """
+    write = writer_for(out)
+    recording = Recording(path)
+    station = recording.station if station_file is None else load_station(station_file)
+    pipeline = Pipeline(station, recording.camera_infos, recording.encoder_joints, None if method is None else method.value)
+    rows: list[Row] = []
+    valid = 0
+    console = Console(stderr=True)
+    with Progress(console=console, disable=not console.is_terminal, transient=True) as progress:
+        task = progress.add_task(f"estimating {path.name}", total=max(recording.duration_ns, 1))
+        first_ns: int | None = None
+        for seq, sample in enumerate(estimate_events(recording.events(), pipeline)):
+            first_ns = sample.t_sample_ns if first_ns is None else first_ns
+            rows.append(row_of(seq, sample, station.config.station.arm))
+            valid += sample.status is Status.VALID
+            if seq % 50 == 0:
+                progress.update(task, completed=sample.t_sample_ns - first_ns)
+    write_table(out, write, rows)
+    for problem in recording.problems:
+        _log.warning("%s: %s", path, problem)
+    fraction = valid / len(rows) if rows else 0.0
+    if as_json:
+        print_json(
+            {
+                "recording": str(path),
+                "out": str(out),
+                "method": pipeline.method,
+                "samples": len(rows),
+                "valid_fraction": fraction,
+                "skipped": [str(problem) for problem in recording.problems],
+            }
+        )
+    else:
+        Console().print(f"{out}: {len(rows)} samples, {100 * fraction:.2f} % valid, method {pipeline.method}")

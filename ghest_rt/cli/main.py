@@ -1,0 +1,212 @@
+"""Entry point of `ghest-rt`. Commands import what they need when they run, so that `--help` is quick."""
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ghest_rt.cli.options import MarkerTexture, Method, Movement, Sensor, Side
+from ghest_rt.errors import GhestError
+
+app = typer.Typer(
+    name="ghest-rt",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode="rich",
+    help=(
+        "Glenohumeral (shoulder) angles inside a rehabilitation exoskeleton, in real time, from two RGB-D cameras "
+        "and the encoders.\n\n"
+        "Try it without hardware: [bold]ghest-rt --replay sim_fixtures/[/] and, in a second terminal, [bold]ghest-rt listen[/]"
+    ),
+)
+
+_Recording = Annotated[Path, typer.Argument(metavar="RECORDING", help="Recording (.mcap)", show_default=False)]
+_MethodOption = Annotated[
+    Method | None,
+    typer.Option(help="How markers are found and angles estimated; by default what the station file says", show_default=False),
+]
+_Json = Annotated[bool, typer.Option("--json", help="Print one JSON document on standard output and nothing else there")]
+_Listen = Annotated[
+    str | None,
+    typer.Option(
+        metavar="ENDPOINT",
+        help="Where Zenoh listens, instead of the station file's endpoints; tcp/127.0.0.1:0 takes any free port",
+        show_default=False,
+    ),
+]
+_NoPublish = Annotated[bool, typer.Option("--no-publish", help="Do not open Zenoh at all")]
+_Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Log more, to standard error")]
+
+
+@app.callback(invoke_without_command=True)
+def root(
+    context: typer.Context,
+    replay: Annotated[
+        Path | None,
+        typer.Option(
+            "--replay",
+            metavar="PATH",
+            help="Run the service from a recording, or from every recording of a folder, one after the other",
+            show_default=False,
+        ),
+    ] = None,
+    speed: Annotated[
+        str,
+        typer.Option(
+            metavar="FACTOR|max",
+            help="Pace of the replay: 1 as recorded, 2.5 faster; 'max' publishes every sample as fast as the machine allows",
+        ),
+    ] = "1",
+    loop: Annotated[bool, typer.Option("--loop", help="Replay again and again until stopped")] = False,
+    method: _MethodOption = None,
+    station: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Station file to use instead of the one in the recording", show_default=False),
+    ] = None,
+    listen: _Listen = None,
+    no_publish: _NoPublish = False,
+    as_json: _Json = False,
+    verbose: _Verbose = False,
+    version: Annotated[bool, typer.Option("--version", help="Print the version")] = False,
+) -> None:
+    """Run from a recording with --replay, or use one of the commands."""
+    from ghest_rt.cli.console import set_up_logging
+
+    set_up_logging(verbose)
+    if version:
+        from ghest_rt import __version__
+
+        typer.echo(__version__)
+    elif context.invoked_subcommand is not None:
+        if replay is not None:
+            raise typer.BadParameter(f"--replay and the command {context.invoked_subcommand!r} exclude each other")
+    elif replay is None:
+        raise typer.BadParameter("name a recording with --replay, or a command (see ghest-rt --help)")
+    else:
+        from ghest_rt.cli.replay import ReplayOptions, replay_path
+
+        replay_path(ReplayOptions(replay, speed, loop, method, station, listen, not no_publish, as_json))
+
+
+@app.command()
+def run(
+    station: Annotated[Path, typer.Option(metavar="FILE", help="Station file", show_default=False)],
+    method: _MethodOption = None,
+    listen: _Listen = None,
+    no_publish: _NoPublish = False,
+    duration_s: Annotated[
+        float | None, typer.Option("--duration", metavar="SECONDS", help="Stop after this long", show_default=False)
+    ] = None,
+    as_json: _Json = False,
+) -> None:
+    """Run the service on a station's devices (real ones, or the simulated clinic)."""
+    from ghest_rt.cli.run import RunOptions, run_station
+
+    run_station(RunOptions(station, method, listen, not no_publish, duration_s, as_json))
+
+
+@app.command()
+def simulate(
+    out: Annotated[Path, typer.Option(metavar="FILE", help="Recording to write (.mcap)", show_default=False)],
+    movement: Annotated[
+        Movement | None, typer.Option(help="One of the paper's movements (Table 2)", show_default=False, case_sensitive=False)
+    ] = None,
+    motion: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="OpenSim motion file (.mot) of a shoulder instead", show_default=False)
+    ] = None,
+    sensor: Annotated[
+        Sensor, typer.Option(help="paper: the paper's ideal sensor; sr300: 640x480 with the real one's faults")
+    ] = (Sensor.PAPER),
+    seed: Annotated[int, typer.Option(help="The same seed gives the same bytes")] = 0,
+    duration_s: Annotated[
+        float | None, typer.Option("--duration", metavar="SECONDS", help="Only the first seconds", show_default=False)
+    ] = None,
+    arm: Annotated[Side, typer.Option(help="The patient's arm in the exoskeleton")] = Side.RIGHT,
+    height_m: Annotated[float, typer.Option("--height", metavar="METRES", help="The patient's height")] = 1.75,
+    marker: Annotated[MarkerTexture, typer.Option(help="What is printed on the marker plates")] = MarkerTexture.DISKS,
+    as_json: _Json = False,
+) -> None:
+    """Record a simulated patient in the exoskeleton, with the true angles (needs the extra 'sim')."""
+    from ghest_rt.cli.simulate import SimulateChoice, simulate_recording
+
+    simulate_recording(SimulateChoice(out, movement, motion, sensor, seed, duration_s, arm, height_m, marker, as_json))
+
+
+@app.command()
+def estimate(
+    recording: _Recording,
+    out: Annotated[Path, typer.Option(metavar="FILE", help="Table to write: .csv or .parquet", show_default=False)],
+    method: _MethodOption = None,
+    station: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Station file to use instead of the one in the recording", show_default=False),
+    ] = None,
+    as_json: _Json = False,
+) -> None:
+    """Turn a recording into a table of angles, off line, as fast as the machine allows."""
+    from ghest_rt.cli.estimate import estimate as estimate_recording
+
+    estimate_recording(recording, method, out, station, as_json)
+
+
+@app.command()
+def score(
+    recordings: Annotated[
+        list[Path], typer.Argument(metavar="RECORDING...", help="Recordings with truth, or folders of them", show_default=False)
+    ],
+    method: _MethodOption = None,
+    as_json: _Json = False,
+) -> None:
+    """Compare estimates with the truth in simulated recordings: the paper's error metrics."""
+    from ghest_rt.cli.score import score_paths
+
+    score_paths(recordings, method, as_json)
+
+
+@app.command()
+def listen(
+    connect: Annotated[str, typer.Option(metavar="ENDPOINT", help="Where a ghest-rt publishes")] = "tcp/127.0.0.1:7447",
+    count: Annotated[
+        int | None, typer.Option(min=1, metavar="N", help="Stop after so many samples", show_default=False)
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the messages as they come, one JSON document a line")] = False,
+) -> None:
+    """Print the angles that a running ghest-rt publishes."""
+    from ghest_rt.cli.listen import listen_to
+
+    listen_to(connect, count, as_json)
+
+
+@app.command()
+def schema(
+    out: Annotated[
+        Path | None, typer.Option(metavar="FOLDER", help="Write one file per message instead of printing", show_default=False)
+    ] = None,
+) -> None:
+    """Print the JSON Schemas of the published messages."""
+    from ghest_rt.cli.schema import show_schemas
+
+    show_schemas(out)
+
+
+def main() -> None:
+    """Run the command line; errors that a user can mend become one message and an exit code."""
+    try:
+        app()
+    except GhestError as error:
+        _fail(str(error), error.exit_code)
+    except KeyboardInterrupt:
+        _fail("interrupted", 130)
+    except Exception as error:
+        from ghest_drivers.errors import DriverError
+
+        if not isinstance(error, DriverError):
+            raise
+        _fail(str(error), 3)
+
+
+def _fail(message: str, exit_code: int) -> None:
+    sys.stderr.write(f"ghest-rt: {message}\n")
+    sys.exit(exit_code)

@@ -1,0 +1,97 @@
+"""`ghest-rt score`: how far the estimates are from the truth."""
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from functools import partial
+from pathlib import Path
+from statistics import fmean
+
+from rich.console import Console
+from rich.progress import Progress, TaskID
+from rich.table import Table
+
+from ghest_rt.cli.console import print_json
+from ghest_rt.cli.options import Method
+from ghest_rt.errors import BadInputError
+from ghest_rt.studies.score import RecordingScore, score_recording
+
+
+def score_paths(paths: Sequence[Path], method: Method | None, as_json: bool) -> None:
+    """Score recordings, and all those of folders, and print a table or one JSON document.
+
+    Raises:
+        BadInputError: A path holds no recording, or one without truth.
+    """
+    files = [file for path in paths for file in _recordings(path)]
+    console = Console(stderr=True)
+    scores: list[RecordingScore] = []
+    with Progress(console=console, disable=not console.is_terminal, transient=True) as progress:
+        for file in files:
+            task = progress.add_task(file.name, total=1.0)
+            show = partial(_show, progress, task)
+            scores.append(score_recording(file, None if method is None else method.value, progress=show))
+            progress.remove_task(task)
+    if as_json:
+        print_json({"recordings": [asdict(score) for score in scores], "mean": _mean(scores)})
+    else:
+        _print_table(scores)
+
+
+def _show(progress: Progress, task: TaskID, share: float) -> None:
+    progress.update(task, completed=share)
+
+
+def _recordings(path: Path) -> list[Path]:
+    if not path.is_dir():
+        return [path]
+    files = sorted(path.glob("*.mcap"))
+    if not files:
+        raise BadInputError(f"{path}: no recording (*.mcap) in this folder; name a file or another folder")
+    return files
+
+
+def _mean(scores: Sequence[RecordingScore]) -> dict[str, float]:
+    """The paper's last column: the mean over movements."""
+    return {
+        "orientation_rmse_deg": fmean(score.orientation_rmse_deg for score in scores),
+        "position_rmse_m": fmean(score.position_rmse_m for score in scores),
+        "m0_rmse_m": fmean(score.m0_rmse_m for score in scores),
+        "m1_rmse_m": fmean(score.m1_rmse_m for score in scores),
+        "valid_fraction": fmean(score.valid_fraction for score in scores),
+    }
+
+
+def _print_table(scores: Sequence[RecordingScore]) -> None:
+    table = Table(caption="Root mean square errors against the truth (the paper's metrics, 3.4.2)", caption_justify="left")
+    table.add_column("recording", overflow="fold")
+    for column in ("method", "orientation", "arm position", "marker m0", "marker m1", "samples", "valid"):
+        table.add_column(column, justify="right")
+    for score in scores:
+        table.add_row(
+            Path(score.recording).name,
+            score.method,
+            f"{score.orientation_rmse_deg:.4f}°",
+            f"{score.position_rmse_m * 1000:.4f} mm",
+            f"{score.m0_rmse_m * 1000:.4f} mm",
+            f"{score.m1_rmse_m * 1000:.4f} mm",
+            str(score.samples),
+            f"{100 * score.valid_fraction:.2f} %",
+        )
+    if len(scores) > 1:
+        mean = _mean(scores)
+        table.add_section()
+        table.add_row(
+            "mean",
+            "",
+            f"{mean['orientation_rmse_deg']:.4f}°",
+            f"{mean['position_rmse_m'] * 1000:.4f} mm",
+            f"{mean['m0_rmse_m'] * 1000:.4f} mm",
+            f"{mean['m1_rmse_m'] * 1000:.4f} mm",
+            "",
+            f"{100 * mean['valid_fraction']:.2f} %",
+        )
+    console = Console()
+    console.print(table)
+    for score in scores:
+        for line in score.skipped:
+            console.print(f"{Path(score.recording).name}: {line}", style="yellow", markup=False)
