@@ -1,6 +1,7 @@
 """Dimensions of the patient's upper body, scaled by height, in the axes of E and for the right arm.
 
-Segment lengths after Drillis and Contini (1966): upper arm 0.186 H, forearm 0.146 H, hand 0.108 H. The rest is drawn to proportion.
+Segment lengths after Drillis and Contini (1966): upper arm 0.186 H, forearm 0.146 H, hand 0.108 H. The rest is drawn to
+proportion.
 """
 
 from dataclasses import dataclass
@@ -49,7 +50,8 @@ class Anatomy:
     def exoskeleton_settings_m(self) -> dict[str, float]:
         """Return the prismatic settings a therapist would make, to the 5 mm marks of the scales.
 
-        The upper-arm link is set 45 mm longer than the arm, to reach where the arm does; the forearm module follows the forearm.
+        The upper-arm link is set 45 mm longer than the arm, to reach where the arm does; the forearm module follows the
+        forearm.
         """
         mark = 0.005
         upper = round((self.upper_arm_m + 0.045 - 0.225) / mark) * mark

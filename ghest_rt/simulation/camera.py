@@ -47,8 +47,8 @@ class _Picture:
     """An ideal image: background traced on a coarse grid, the marker's surroundings at full resolution."""
 
     colors: Float32 | None
-    z_m: Float32 | Array
-    facing: Float32 | None
+    z_m: Array
+    facing: Array | None
 
 
 class SimulatedCamera:
@@ -70,6 +70,7 @@ class SimulatedCamera:
         self,
         clinic: Clinic,
         name: str,
+        *,
         marker_name: str,
         marker: Marker,
         texture: Texture,

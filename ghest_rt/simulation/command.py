@@ -114,7 +114,7 @@ def build_world(options: SimulateOptions) -> World:
         body,
         _motion(options),
         sensors,
-        options.seed,
+        seed=options.seed,
         texture=options.marker,
         light=Light(options.brightness, options.white_balance),
         duration_s=options.duration_s,

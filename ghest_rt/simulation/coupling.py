@@ -1,8 +1,8 @@
-"""The exoskeleton follows the patient through its cuffs: inverse kinematics on a dense grid, splined; the spline *is* the truth.
+"""The exoskeleton follows the patient through its cuffs: inverse kinematics on a dense grid.
 
-Two cuffs: at the elbow the exoskeleton's elbow pivot keeps its place against the upper arm (position, 3 equations, held by j0, j1, j2), and the
-forearm module keeps the direction of the forearm (2 equations, j4, j6). Neither cuff is centred on the anatomy. Pro/supination and
-wrist follow the hand.
+Two cuffs: the exoskeleton's elbow pivot keeps its place against the upper arm (position: 3 equations, met by j0, j1, j2), and
+the forearm module keeps the direction of the forearm (2 equations, met by j4, j6). Neither cuff is centred on the anatomy.
+Pro/supination and wrist follow the hand.
 """
 
 import math
@@ -14,7 +14,6 @@ from scipy.interpolate import CubicSpline
 
 from ghest_rt.errors import GhestError
 from ghest_rt.geometry.so3 import Array
-from ghest_rt.simulation.anatomy import MIRROR
 from ghest_rt.simulation.posture import Motion
 from ghest_rt.simulation.scene import Scene, exoskeleton_spec
 
@@ -23,7 +22,7 @@ _PAD_S = 0.15
 _ELBOW_CUFF_M = np.array([-0.012, 0.004, 0.010])  # the exoskeleton's elbow pivot in the humerus' axes, from the elbow centre
 _FOREARM_CUFF_RAD = (math.radians(2.0), math.radians(-1.5))  # tilt of the forearm module against the forearm, about its x and z
 _START_RAD = {"j0": -0.7, "j1": 1.2}  # the outer branch: the links swing out to the side, away from the torso
-_TOLERANCE_M = 2e-6
+_TOLERANCE = 2e-6
 _FIRST_ITERATIONS = 200
 _ITERATIONS = 20
 _DT_S = 1.0
@@ -31,7 +30,7 @@ _REFUSAL_M = 0.005
 
 
 class ExoskeletonMotion:
-    """Joint positions of the exoskeleton over the whole movement.
+    """Joint positions of the exoskeleton over the whole movement: a spline, which *is* the truth at every instant.
 
     Args:
         scene: The clinic.
@@ -50,8 +49,7 @@ class ExoskeletonMotion:
         times = np.arange(-_PAD_S, motion.duration_s + _PAD_S + step_s, step_s)
         follower = _Follower(scene, settings_m, urdf_text, source)
         self._spline = CubicSpline(times, np.array([follower.solve(motion, float(t)) for t in times]))
-        follower_free = [name for name in self._names if name in settings_m]
-        self._fixed = {self._names.index(name): settings_m[name] for name in follower_free}
+        self._fixed = {self._names.index(name): value for name, value in settings_m.items()}
         self._mimics = follower.mimics
 
     @property
@@ -98,7 +96,8 @@ class _Follower:
     def solve(self, motion: Motion, t_s: float) -> Array:
         """Return the joint positions at `t_s`."""
         scene, data = self._scene, self._data
-        scene.pose_patient(data, motion.at(t_s))
+        posture = motion.at(t_s)
+        scene.pose_patient(data, posture)
         mujoco.mj_kinematics(scene.model, data)
         arm, forearm = data.body("humerus"), data.body("forearm")
         cuff = np.asarray(arm.xmat).reshape(3, 3) @ (_ELBOW_CUFF_M * (1.0, self._sign, 1.0))
@@ -118,7 +117,7 @@ class _Follower:
                 constraints=self._constraints,
             )
             self._configuration.integrate_inplace(velocity, _DT_S)
-            if float(np.abs(velocity).max()) < _TOLERANCE_M:
+            if float(np.abs(velocity).max()) < _TOLERANCE:
                 break
         off_m = float(np.linalg.norm(self._configuration.data.body("l5").xpos - elbow_m))
         if off_m > _REFUSAL_M:
@@ -128,11 +127,8 @@ class _Follower:
             )
         self._first = False
         q = np.array([self._configuration.q[self._index[name]] for name in self._names])
-        hand = (
-            data.qpos[scene.model.joint("patient_pronation").qposadr[0]],
-            data.qpos[scene.model.joint("patient_wrist_flexion").qposadr[0]],
-        )
-        q[self._names.index("j8")], q[self._names.index("j9")] = hand
+        q[self._names.index("j8")] = posture.elbow_rad[1]
+        q[self._names.index("j9")] = posture.wrist_rad[0]
         return q
 
     def _position(self, model: mujoco.MjModel, joint_id: int) -> int:

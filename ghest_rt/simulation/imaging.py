@@ -65,7 +65,7 @@ class DepthSensor:
         self._profile = profile
         self._noise = _tile(rng, profile.depth.height_px, profile.depth.width_px, 1, 1.0 if profile.depth_noise_m else 0.0)
 
-    def measure(self, z_m: Float32 | Array, facing: Float32 | None, rng: np.random.Generator) -> NDArray[np.uint16]:
+    def measure(self, z_m: Array, facing: Array | None, rng: np.random.Generator) -> NDArray[np.uint16]:
         """Return the (H, W) uint16 counts of ideal depths; `facing` is the cosine between ray and surface normal."""
         p = self._profile
         low, high = p.range_m
@@ -77,7 +77,7 @@ class DepthSensor:
             valid &= (cv2.dilate(flat, kernel) - cv2.erode(flat, kernel)) < _EDGE_M
             valid &= facing > _GRAZING_COSINE
         if self._noise is not None:
-            noise = _cut(self._noise, *z.shape, rng)[..., 0]
+            noise = _cut(self._noise, z.shape[0], z.shape[1], rng)[..., 0]
             valid &= np.abs(noise) < _DROPOUT_SIGMAS
             z = z + p.depth_noise_m * noise
         counts = np.rint(z / p.depth_unit_m)

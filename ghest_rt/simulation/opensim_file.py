@@ -33,8 +33,8 @@ def read_motion_table(path: Path) -> MotionTable:
     """Read a motion file.
 
     Raises:
-        BadInputError: Missing, not text, without header or column names, a row of the wrong length, something that is not a finite
-            number, or times that do not increase; names file and line.
+        BadInputError: Missing, not text, without header or column names, a row of the wrong length, something that is not a
+            finite number, or times that do not increase; names file and line.
     """
     try:
         if path.stat().st_size > _MAX_BYTES:

@@ -2,15 +2,15 @@
 
 OpenSim's axes (X forwards, Y up, Z to the right) are E's by a rotation: X = -z, Y = x, Z = -y.
 
-Glenohumeral joint: `R = R_Y(plane_elv) R_-X(shoulder_elv) R_Y(axial_rot)`, scapula to humerus, taken over exactly. OpenSim's zero is the
-arm hanging with the elbow's bending plane sagittal; ours is the arm stretched forward. A fixed rotation converts the humerus axes:
-along the shaft (Y) is the arm's z, forwards (X, where the bent forearm points) its y, right (Z) its x.
+Glenohumeral joint: `R = R_Y(plane_elv) R_-X(shoulder_elv) R_Y(axial_rot)`, scapula to humerus, taken over exactly. OpenSim's
+zero is the arm hanging with the elbow bending forwards; ours is the arm stretched forward. A fixed rotation converts the axes of
+the humerus: along the shaft (Y) is the arm's z, forwards (X, where the bent forearm points) its y, right (Z) its x.
 
-Thorax, clavicle and scapula: what is recorded against the first row is applied, since the seat puts the patient's resting posture where
-the exoskeleton needs it. Clavicle: protraction and elevation move the acromion. Scapula: its attitude on the thorax is composed of
-abduction (about the vertical), upward rotation (about the normal of the scapular plane, which is turned 35 degrees to the side),
-elevation (tilt about the axis towards the glenoid) and winging (about the medial border, taken as vertical); the ellipsoid of the model is
-not reproduced. The elbow is not measured in such files: it is held at 90 degrees.
+Thorax, clavicle and scapula: what is recorded against the first row is applied, since the seat puts the patient's resting
+posture where the exoskeleton needs it. Clavicle: protraction and elevation move the acromion. Scapula: its attitude on the
+thorax is composed of abduction (about the vertical), upward rotation (about the normal of the scapular plane, which is turned 35
+degrees to the side), elevation (tilt about the axis towards the glenoid) and winging (about the medial border, taken as
+vertical); the ellipsoid of the model is not reproduced. The elbow is not measured in such files: it is held at 90 degrees.
 """
 
 import math
@@ -60,10 +60,10 @@ class OpenSimMotion:
         zero = np.zeros_like(t)
 
         def angle(column: str) -> Array:
-            return factor * table.columns.get(column, zero)
+            return np.asarray(factor * table.columns.get(column, zero), dtype=np.float64)
 
         def metres(column: str) -> Array:
-            return table.columns.get(column, zero)
+            return np.asarray(table.columns.get(column, zero), dtype=np.float64)
 
         in_scapula = _about(_Y, angle("plane_elv")) * _about(-_X, angle("shoulder_elv")) * _about(_Y, angle("axial_rot"))
         gh = Rotation.from_matrix(E_FROM_OPENSIM @ in_scapula.as_matrix() @ HUMERUS_FROM_ARM)

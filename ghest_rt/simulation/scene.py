@@ -193,10 +193,7 @@ class _PatientBuilder:
             group=PLATE_GROUPS[marker],
         )
         start = p - (half * 2 + 0.006) * R[:, 2]
-        if marker == "m0":
-            end = self._place(self._body.gh_from_ac_m)
-        else:
-            end = p - 0.035 * R[:, 2]
+        end = self._place(self._body.gh_from_ac_m) if marker == "m0" else p - 0.035 * R[:, 2]
         body.add_geom(
             type=mujoco.mjtGeom.mjGEOM_CAPSULE, fromto=(*start, *end), size=(0.006, 0, 0), rgba=(*_STALK, 1.0), group=1
         )

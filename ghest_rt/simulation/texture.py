@@ -54,8 +54,8 @@ class DiskTexture:
 class ArucoTexture:
     """An ArUco code of DICT_4X4_50 on white: id 0 for m0, 1 for m1.
 
-    The black square's side is twice (half spacing + disk radius), the outer size of the disks. The code image's top left corner is at
-    (-side/2, +side/2) of the marker frame, its rows run along +x.
+    The black square's side is twice (half spacing + disk radius), the outer size of the disks. The code image's top left corner
+    is at (-side/2, +side/2) of the marker frame, its rows run along +x.
     """
 
     def __init__(self, marker: Marker, name: str) -> None:

@@ -139,7 +139,8 @@ def _repetitions(t: Array, rng: np.random.Generator, tempo: float) -> Array:
     start, stop = np.take(times, index), np.take(times, index + 1)
     x = (t - start) / (stop - start)
     blend = x**3 * (10.0 - 15.0 * x + 6.0 * x**2)
-    return np.take(values, index) + (np.take(values, index + 1) - np.take(values, index)) * blend
+    first, last = np.take(values, index), np.take(values, index + 1)
+    return np.asarray(first + (last - first) * blend, dtype=np.float64)
 
 
 def _companion(t: Array, drive: Array, rng: np.random.Generator) -> Array:

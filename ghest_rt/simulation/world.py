@@ -48,6 +48,7 @@ class World:
         body: Anatomy,
         motion: Motion,
         sensors: SensorSet,
+        *,
         seed: int,
         texture: MarkerTexture = "disks",
         light: Light | None = None,
@@ -72,13 +73,13 @@ class World:
             name: SimulatedCamera(
                 self._clinic,
                 name,
-                camera.marker,
-                config.markers[camera.marker],
-                make_texture(texture, config.markers[camera.marker], camera.marker),
-                sensors.camera,
-                light or Light(),
-                self.timeline,
-                seed,
+                marker_name=camera.marker,
+                marker=config.markers[camera.marker],
+                texture=make_texture(texture, config.markers[camera.marker], camera.marker),
+                profile=sensors.camera,
+                light=light or Light(),
+                timeline=self.timeline,
+                seed=seed,
             )
             for name, camera in config.cameras.items()
         }
