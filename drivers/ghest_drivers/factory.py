@@ -34,6 +34,11 @@ CAMERAS: dict[str, Backend] = {
 }
 ENCODERS: dict[str, Backend] = {
     "sim": Backend("ghest_drivers.sim", "SimEncoders", "sim"),
+    "serial": Backend("ghest_drivers.hardware.encoders.serial_link", "SerialEncoderLink", "serial"),
+    "can": Backend("ghest_drivers.hardware.encoders.can_link", "CanEncoderLink", "can"),
+    "can_log": Backend("ghest_drivers.hardware.encoders.can_log", "can_log_link", "can"),
+    "canopen": Backend("ghest_drivers.hardware.encoders.canopen_link", "CanopenEncoderLink", "can"),
+    "armeo": Backend("ghest_drivers.hardware.encoders.armeo_export", "armeo_link"),
 }
 
 

@@ -4,6 +4,7 @@ from typing import Literal
 
 from pydantic import Field
 
+from ghest_rt.config.encoder_devices import HardwareEncoderBackend
 from ghest_rt.config.strict import Strict
 
 
@@ -32,13 +33,5 @@ class RealsenseBackend(Strict):
     laser_power: int | None = Field(default=None, ge=0, le=16)
 
 
-class SerialBackend(Strict):
-    """An encoder box on a serial line (needs the extra `serial`)."""
-
-    backend: Literal["serial"]
-    port: str
-    baud: int = 115200
-
-
 CameraBackend = SimBackend | ReplayBackend | RealsenseBackend
-EncoderBackend = SimBackend | ReplayBackend | SerialBackend
+EncoderBackend = SimBackend | ReplayBackend | HardwareEncoderBackend

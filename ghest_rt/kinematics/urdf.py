@@ -47,6 +47,7 @@ class Joint:
         upper: Greatest position, rad or m; inf where the URDF states none.
         mimic: The joint it follows, if any.
         where: "file:line: <joint name=...>", for messages.
+        max_rate: Greatest speed, rad/s or m/s; inf where the URDF states none.
     """
 
     name: str
@@ -59,6 +60,7 @@ class Joint:
     upper: float
     mimic: Mimic | None
     where: str
+    max_rate: float = math.inf
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -168,6 +170,7 @@ def _joint(node: Node, source: str) -> Joint:
         upper=upper,
         mimic=_mimic(node, where),
         where=where,
+        max_rate=_max_rate(node, where),
     )
 
 
@@ -184,6 +187,12 @@ def _limits(node: Node, kind: JointKind, where: str) -> tuple[float, float]:
     if lower > upper:
         raise BadInputError(f"{where} <limit>: lower {lower:g} is above upper {upper:g}; swap them")
     return lower, upper
+
+
+def _max_rate(node: Node, where: str) -> float:
+    limit = node.child("limit")
+    rate = 0.0 if limit is None else _number(limit, "velocity", "0", where)
+    return rate if rate > 0.0 else math.inf  # many files state 0 for "not known"
 
 
 def _mimic(node: Node, where: str) -> Mimic | None:

@@ -12,6 +12,7 @@ from ghest_drivers.interfaces import EncoderLink, RgbdCamera
 from ghest_drivers.replay import ReplayPlayer
 from ghest_drivers.samples import CameraInfo, EncoderInfo, EncoderSample, Intrinsics, RgbdFrame
 from ghest_drivers.sim import SimCamera, SimEncoders
+from tests.hardware_encoders.contract_cases import armeo_encoders, can_encoders, serial_encoders
 
 SAMPLES = 8
 _PERIOD_NS = 4_000_000
@@ -120,6 +121,9 @@ CAMERA_CASES = {
 ENCODER_CASES = {
     "replay": EncoderCase(replay_encoders, ends=True),
     "sim": EncoderCase(sim_encoders, ends=True),
+    "serial": EncoderCase(serial_encoders, ends=False),
+    "can": EncoderCase(can_encoders, ends=False),
+    "armeo": EncoderCase(armeo_encoders, ends=True),
 }
 
 
