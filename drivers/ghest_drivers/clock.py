@@ -1,6 +1,8 @@
 """Clocks. All host times are `int` nanoseconds of one monotonic clock; the clock is an argument, never a global."""
 
+import asyncio
 import time
+from concurrent.futures import ThreadPoolExecutor
 from typing import Protocol
 
 
@@ -43,3 +45,23 @@ class VirtualClock:
     def sleep_until_ns(self, t_ns: int) -> None:
         """Jump to `t_ns`, never backwards."""
         self._now_ns = max(self._now_ns, t_ns)
+
+
+class AsyncSleeper:
+    """Waits on any clock without holding up the event loop, on a thread of its own."""
+
+    def __init__(self, clock: Clock) -> None:
+        self._clock = clock
+        self._pool: ThreadPoolExecutor | None = None
+
+    async def sleep_until_ns(self, t_ns: int) -> None:
+        """Wait until the clock shows `t_ns`; a cancelled wait keeps the thread busy until then."""
+        if self._pool is None:
+            self._pool = ThreadPoolExecutor(1, thread_name_prefix="sleeper")
+        await asyncio.get_running_loop().run_in_executor(self._pool, self._clock.sleep_until_ns, t_ns)
+
+    def close(self) -> None:
+        """Let the thread end; harmless if done before."""
+        if self._pool is not None:
+            self._pool.shutdown(wait=False)
+            self._pool = None

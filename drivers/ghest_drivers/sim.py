@@ -9,7 +9,7 @@ import asyncio
 from dataclasses import replace
 from typing import Protocol, runtime_checkable
 
-from ghest_drivers.clock import Clock
+from ghest_drivers.clock import AsyncSleeper, Clock
 from ghest_drivers.errors import DeviceLost, EndOfStream, ReadTimeout
 from ghest_drivers.samples import CameraInfo, EncoderInfo, EncoderSample, RgbdFrame
 
@@ -116,6 +116,7 @@ class SimEncoders:
         self._clock = clock
         self._start_ns = start_ns
         self._is_open = False
+        self._sleeper = AsyncSleeper(clock)
         self._info: EncoderInfo | None = None
         self._next = 0
         self._waiting: EncoderSample | None = None
@@ -141,9 +142,7 @@ class SimEncoders:
         while (now_ns := self._clock.now_ns()) < sample.t_arrival_ns:
             if now_ns >= deadline_ns:
                 raise ReadTimeout("simulated encoders: no sample yet")
-            until_ns = min(sample.t_arrival_ns, deadline_ns, now_ns + _SLICE_NS)
-            await asyncio.sleep((until_ns - now_ns) * 1e-9)
-            self._clock.sleep_until_ns(until_ns)  # what little is left of it, or the jump of a virtual clock
+            await self._sleeper.sleep_until_ns(min(sample.t_arrival_ns, deadline_ns, now_ns + _SLICE_NS))
             if not self._is_open:
                 raise DeviceLost("the simulated encoders were closed")
         self._waiting = None
@@ -163,3 +162,4 @@ class SimEncoders:
             t_arrival_ns=sample.t_arrival_ns + self._start_ns,
             t_capture_ns=sample.t_capture_ns + self._start_ns,
         )
+        self._sleeper.close()

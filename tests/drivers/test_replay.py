@@ -1,5 +1,6 @@
 """The replay's own behaviour, beyond what every backend promises."""
 
+import asyncio
 import threading
 from collections.abc import Iterator
 
@@ -205,3 +206,28 @@ def test_closing_the_player_wakes_readers_and_ends_its_thread() -> None:
     assert "replay-feeder" not in [thread.name for thread in threading.enumerate()]
     with pytest.raises(DeviceNotFound):
         camera.open()
+
+
+async def test_a_slow_clock_does_not_hold_up_the_event_loop() -> None:
+    class SlowClock(MonotonicClock):
+        """Runs at a tenth of the host's pace."""
+
+        def now_ns(self) -> int:
+            return super().now_ns() // 10
+
+        def sleep_until_ns(self, t_ns: int) -> None:
+            super().sleep_until_ns(t_ns * 10)
+
+    player = _player([_sample(0, 0), _sample(1, 30)], SlowClock())
+    encoders = player.encoders()
+    await encoders.open()
+    await encoders.read(10.0)
+    reading = asyncio.ensure_future(encoders.read(10.0))
+    turns = 0
+    while not reading.done():
+        await asyncio.sleep(0.001)
+        turns += 1
+    await encoders.close()
+    player.close()
+    assert (await reading).seq == 1
+    assert turns > 20  # of 300; two or three if the loop were held up

@@ -2,7 +2,7 @@
 
 import asyncio
 
-from ghest_drivers.clock import Clock
+from ghest_drivers.clock import AsyncSleeper, Clock
 from ghest_drivers.replay.outlet import FEED_WAIT_S, Outlet
 from ghest_drivers.samples import CameraInfo, EncoderInfo, EncoderSample, RgbdFrame
 
@@ -49,6 +49,7 @@ class ReplayEncoders:
         self.outlet = outlet
         self._info = info
         self._clock = clock
+        self._sleeper = AsyncSleeper(clock)
 
     @property
     def info(self) -> EncoderInfo:
@@ -70,9 +71,9 @@ class ReplayEncoders:
             if found is None:
                 await asyncio.sleep(FEED_WAIT_S)
             else:
-                await asyncio.sleep(max(found - self._clock.now_ns(), 0) * 1e-9)
-                self._clock.sleep_until_ns(found)  # what little is left of it, or the jump of a virtual clock
+                await self._sleeper.sleep_until_ns(found)
 
     async def close(self) -> None:
         """Stop delivering."""
         self.outlet.close()
+        self._sleeper.close()
