@@ -1,0 +1,89 @@
+"""Pixels and rays of one lens, fast for the handful of points a frame needs."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ghest_drivers.samples import Intrinsics
+from ghest_rt.geometry.so3 import Array
+from ghest_rt.vision.registration import ray_grid
+
+
+class Optics:
+    """Pinhole with plumb-bob distortion. "Rays" are (x/z, y/z) with the distortion taken off.
+
+    Args:
+        intrinsics: The lens.
+    """
+
+    def __init__(self, intrinsics: Intrinsics) -> None:
+        self.width_px = intrinsics.width_px
+        self.height_px = intrinsics.height_px
+        self.focal_px = np.array([intrinsics.fx_px, intrinsics.fy_px])
+        self.center_px = np.array([intrinsics.cx_px, intrinsics.cy_px])
+        self.mean_focal_px = float(self.focal_px.mean())
+        self._k = intrinsics.distortion
+        self.ideal = not any(intrinsics.distortion)
+        self._maps = None if self.ideal else _ray_maps(intrinsics)
+
+    def pixels(self, rays: Array) -> Array:
+        """Return the (n, 2) pixel coordinates of (n, 2) rays."""
+        if self.ideal:
+            return rays * self.focal_px + self.center_px
+        k1, k2, p1, p2, k3 = self._k
+        x, y = rays[:, 0], rays[:, 1]
+        r2 = x * x + y * y
+        radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
+        out = np.empty_like(rays)
+        out[:, 0] = x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x)
+        out[:, 1] = y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y
+        return out * self.focal_px + self.center_px
+
+    def jacobians(self, rays: Array) -> Array:
+        """Return (n, 2, 2): derivatives of pixels by rays."""
+        out = np.zeros((len(rays), 2, 2))
+        if self.ideal:
+            out[:, 0, 0], out[:, 1, 1] = self.focal_px
+            return out
+        k1, k2, p1, p2, k3 = self._k
+        x, y = rays[:, 0], rays[:, 1]
+        r2 = x * x + y * y
+        radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
+        slope = 2.0 * (k1 + r2 * (2 * k2 + 3 * r2 * k3))
+        cross = x * y * slope + 2 * p1 * x + 2 * p2 * y
+        out[:, 0, 0] = radial + x * x * slope + 2 * p1 * y + 6 * p2 * x
+        out[:, 0, 1] = out[:, 1, 0] = cross
+        out[:, 1, 1] = radial + y * y * slope + 6 * p1 * y + 2 * p2 * x
+        return out * self.focal_px[:, None]
+
+    def disk_rays(self, centroids_px: Array, radius2_px: NDArray[np.float64] | float) -> Array:
+        """Return the rays (n, 2) through the centroids of small disk images (n, 2), as an undistorted image would show them.
+
+        A curved lens moves the centroid of a spot otherwise than the point there: to second order by
+        r^2 (laplace(ray) / 8 + (grad log det J . grad) ray / 4), with J the derivative of rays by pixels.
+
+        Args:
+            centroids_px: (n, 2) centroids in the image.
+            radius2_px: Square of the spots' radius (geometric mean of the semi-axes), (n, 1) or scalar; 0 for plain points.
+        """
+        if self._maps is None:
+            return (centroids_px - self.center_px) / self.focal_px
+        low = np.floor(centroids_px).astype(np.intp)
+        np.clip(low, 0, (self.width_px - 2, self.height_px - 2), out=low)
+        fx, fy = (centroids_px - low).T[:, :, None]
+        u, v = low.T
+        maps = self._maps
+        top = maps[v, u] * (1 - fx) + maps[v, u + 1] * fx
+        bottom = maps[v + 1, u] * (1 - fx) + maps[v + 1, u + 1] * fx
+        both = top * (1 - fy) + bottom * fy
+        return np.asarray(both[:, :2] + radius2_px * both[:, 2:], dtype=np.float64)
+
+
+def _ray_maps(intrinsics: Intrinsics) -> Array:
+    """Return (h, w, 4): the ray of every pixel, and the second-order shift of a unit-radius spot's centroid."""
+    rays = ray_grid(intrinsics)
+    dv, du = np.gradient(rays, axis=(0, 1))
+    laplace = np.gradient(dv, axis=0) + np.gradient(du, axis=1)
+    log_det = np.log(np.abs(du[..., 0] * dv[..., 1] - du[..., 1] * dv[..., 0]))
+    slope_v, slope_u = np.gradient(log_det)
+    shift = laplace / 8.0 + (slope_u[..., None] * du + slope_v[..., None] * dv) / 4.0
+    return np.concatenate([rays, shift], axis=2)

@@ -1,0 +1,227 @@
+"""Method `refined`: sub-pixel disks and the depth plane fused into one pose with its covariance (docs/vision.md)."""
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from ghest_drivers.samples import CameraInfo, RgbdFrame
+from ghest_rt.config.station import Marker
+from ghest_rt.geometry.se3 import inverse, transform
+from ghest_rt.geometry.so3 import Array
+from ghest_rt.messages.results import MarkerObservation, MarkerStatus
+from ghest_rt.vision.checks import check_frame
+from ghest_rt.vision.color_blobs import BlobFinder
+from ghest_rt.vision.constellation import ConstellationFinder
+from ghest_rt.vision.disk_centers import DiskCenters, DiskMeter
+from ghest_rt.vision.ellipses import disk_images
+from ghest_rt.vision.layout import MarkerLayout
+from ghest_rt.vision.motion import MotionTrack
+from ghest_rt.vision.optics import Optics
+from ghest_rt.vision.planar_pose import Pose, poses_of_homography
+from ghest_rt.vision.plate_light import PlateLight, PlateSampler
+from ghest_rt.vision.plate_plane import Plane, PlateDepth
+from ghest_rt.vision.solve import Solution, Solver
+
+_BAND_PX = 2.0
+_COLD_BAND_PX = 3.5
+_BAND_OF_MARGIN = 0.6  # share of the white margin around a disk that the band may take
+_CENTERED_PX = 0.4  # a prediction this good needs no second look
+_MAX_LOOKS = 3
+_LEARN = 0.2
+_TRACKED_GATES_M = (0.004,)
+_COLD_GATES_M = (0.02, 0.006)
+_PLANE_FLOOR = 5e-5  # of theta, relative: what no number of pixels averages out
+_MOTION_DOUBT = 0.15  # share of the motion between colour and depth image that may be wrong
+_SURE_SHARE = 0.85
+_NEUTRAL = (1.0, 1.0, 1.0)
+
+
+class RefinedDetector:
+    """Finds and tracks one marker in one camera. Stateful: frames in the order of capture, one thread.
+
+    Args:
+        camera_name: For the observations.
+        marker_name: For the observations.
+        marker: Geometry and nominal colours.
+        info: The camera's calibration.
+        color_only: Leave depth aside.
+    """
+
+    def __init__(
+        self, camera_name: str, marker_name: str, marker: Marker, info: CameraInfo, *, color_only: bool = False
+    ) -> None:
+        self._camera = camera_name
+        self._marker = marker_name
+        self._info = info
+        self._layout = MarkerLayout.of(marker)
+        self._optics = Optics(info.color)
+        self._sampler = PlateSampler(self._layout, self._optics)
+        self._meter = DiskMeter(self._layout)
+        self._depth = None if color_only else PlateDepth(self._layout, info)
+        self._finder = BlobFinder(info.color.width_px, info.color.height_px)
+        self._constellations = ConstellationFinder(self._layout, self._optics)
+        self._solver = Solver(self._layout, self._optics)
+        self._motion = MotionTrack()
+        self._white: tuple[float, float, float] | None = None
+        self._light: PlateLight | None = None
+        self._depth_from_color = inverse(info.color_from_depth)
+        self._same_place = bool(np.abs(info.color_from_depth - np.eye(4)).max() < 1e-12)
+        margin_m = self._layout.half_plate_m - float(np.abs(self._layout.centers_m).max()) - self._layout.radius_m
+        self._margin = max(margin_m, 0.1 * self._layout.radius_m) / self._layout.radius_m
+
+    def reset(self) -> None:
+        """Forget pose, motion, light and colours."""
+        self._motion.reset()
+        self._meter.reset()
+        self._white = None
+
+    def detect(self, frame: RgbdFrame) -> MarkerObservation:
+        """Return the marker's pose in the colour camera frame with its covariance, or why there is none.
+
+        Raises:
+            BadInputError: The images are not those of the camera that the detector was made for.
+        """
+        check_frame(frame, self._info)
+        predicted = self._motion.predict(frame.t_capture_ns)
+        solution = Solution(MarkerStatus.NOT_FOUND)
+        if predicted is not None:
+            solution = self._track(frame, predicted)
+        if solution.fit is None:
+            tracked, solution = solution, self._search(frame)
+            if solution.status is MarkerStatus.NOT_FOUND:
+                solution = tracked
+        return self._observation(frame, solution)
+
+    def _observation(self, frame: RgbdFrame, solution: Solution) -> MarkerObservation:
+        fit = solution.fit
+        pose = covariance = None
+        if fit is not None:
+            pose = transform(fit.R, fit.p_m)
+            covariance = np.linalg.inv(fit.information)
+            self._motion.update(frame.t_capture_ns, pose)
+        return MarkerObservation(
+            camera=self._camera,
+            marker=self._marker,
+            seq=frame.seq,
+            t_capture_ns=frame.t_capture_ns,
+            t_arrival_ns=frame.t_arrival_ns,
+            status=solution.status,
+            camera_from_marker=pose,
+            covariance=covariance,
+            disks_used=solution.disks,
+            depth_used=solution.status is MarkerStatus.OK,
+        )
+
+    def _track(self, frame: RgbdFrame, predicted: Array) -> Solution:
+        """Measure where the marker should be by now."""
+        measured = self._look(frame.color_rgb, predicted[:3, [0, 1, 3]], _BAND_PX)
+        if isinstance(measured, MarkerStatus):
+            return Solution(measured)
+        centers = self._solver.centers(measured)
+        plane = self._plane(frame, predicted, _TRACKED_GATES_M) if len(centers.sigma) >= 2 else None
+        solution = self._solver.track(centers, plane, (predicted[:3, :3], predicted[:3, 3]))
+        if solution.fit is not None:
+            self._learn(measured)
+        return solution
+
+    def _search(self, frame: RgbdFrame) -> Solution:
+        """Look for the marker everywhere, first under the light last seen or guessed, then under neutral light."""
+        guess = self._white or self._finder.bright_white(frame.color_rgb)
+        best = Solution(MarkerStatus.NOT_FOUND)
+        for white in (guess, _NEUTRAL):
+            blobs = self._finder.find(frame.color_rgb, white)
+            constellation = None if blobs is None else self._constellations.find(blobs)
+            if constellation is not None:
+                self._meter.relative = constellation.relative
+                solution = self._cold(frame, constellation.H, constellation.found)
+                if solution.fit is not None:
+                    return solution
+                best = solution
+            elif blobs is not None and best.status is MarkerStatus.NOT_FOUND:
+                best = Solution(MarkerStatus.TOO_FEW_DISKS)
+        self._white = None
+        return best
+
+    def _cold(self, frame: RgbdFrame, H: Array, found: int) -> Solution:
+        """Solve from a rough homography of the plate."""
+        measured = self._look(frame.color_rgb, H, _COLD_BAND_PX)
+        if isinstance(measured, MarkerStatus):
+            return Solution(measured)
+        centers = self._solver.centers(measured)
+        if len(centers.sigma) < 3:
+            return Solution(MarkerStatus.TOO_FEW_DISKS, disks=len(centers.sigma))
+        starts = poses_of_homography(_homography(centers.plate_m, centers.rays))
+        if starts is None:
+            return Solution(MarkerStatus.BAD_FIT, disks=len(centers.sigma))
+        solution = self._solver.cold(centers, self._cold_plane(frame, starts), starts)
+        if solution.fit is not None and found < 4:
+            # The homography was only affine: look again from the pose, also for the disk that was missing.
+            solution = self._track(frame, transform(solution.fit.R, solution.fit.p_m))
+        elif solution.fit is not None:
+            self._learn(measured)
+        return solution
+
+    def _look(self, image: NDArray[np.uint8], H: Array, band_px: float) -> DiskCenters | MarkerStatus:
+        """Measure the disks that a homography predicts, again where they turn out to be off."""
+        images = disk_images(H, self._layout.centers_m, self._layout.radius_m, self._optics)
+        light = self._sampler(image, H)
+        if images is None or light is None:
+            return MarkerStatus.NOT_FOUND
+        self._light = light
+        centers_px = None
+        for look in range(_MAX_LOOKS):
+            band = max(min(band_px, _BAND_OF_MARGIN * self._margin * images.minor_px), 1.0)
+            measured = self._meter.measure(image, images, light, band, centers_px)
+            if look + 1 == _MAX_LOOKS or measured.shift_px < _CENTERED_PX or not measured.good.any():
+                break
+            before = images.centers_px if centers_px is None else centers_px
+            shift = (measured.centers_px - before)[measured.good].mean(axis=0)
+            centers_px = np.where(measured.good[:, None], measured.centers_px, before + shift)
+            band_px = _BAND_PX
+        return measured
+
+    def _plane(self, frame: RgbdFrame, predicted: Array, gates_m: tuple[float, ...]) -> Plane | None:
+        """Fit the plate's plane and bring it into the colour camera at the colour image's time."""
+        if self._depth is None or frame.depth_counts is None:
+            return None
+        dt_s = (frame.t_depth_capture_ns - frame.t_capture_ns) * 1e-9
+        then = self._motion.advance(predicted, dt_s) if dt_s else predicted
+        plane = self._depth.fit(frame.depth_counts, self._depth_from_color @ then, gates_m)
+        if plane is None:
+            return None
+        floor = _PLANE_FLOOR
+        if dt_s or not self._same_place:
+            moved = then @ inverse(predicted)
+            floor += _MOTION_DOUBT * float(np.abs(then[:3, 3] - predicted[:3, 3]).max()) / float(predicted[2, 3])
+            floor += _MOTION_DOUBT * float(np.abs(moved[:3, :3] - np.eye(3)).max())
+            plane = plane.seen_from(self._depth_from_color @ moved)
+        covariance = plane.covariance + np.eye(3) * (floor * floor * float(plane.theta @ plane.theta))
+        return Plane(plane.theta, covariance, plane.share)
+
+    def _cold_plane(self, frame: RgbdFrame, starts: tuple[Pose, Pose]) -> Plane | None:
+        """Fit the plane from whichever of the two poses explains more of the depth image."""
+        best: Plane | None = None
+        for R, p_m in starts:
+            plane = self._plane(frame, transform(R, p_m), _COLD_GATES_M)
+            if plane is not None and (best is None or plane.share > best.share):
+                best = plane
+            if best is not None and best.share > _SURE_SHARE:
+                break
+        return best
+
+    def _learn(self, measured: DiskCenters) -> None:
+        """Let the remembered colours of disks and light follow what was seen."""
+        good = measured.good[:, None]
+        relative = self._meter.relative
+        self._meter.relative = np.where(good, relative + _LEARN * (measured.relative - relative), relative)
+        if self._light is not None:
+            red, green, blue = (3.0 * self._light.rgb).tolist()
+            self._white = (red, green, blue)
+
+
+def _homography(plate_m: Array, rays: Array) -> Array:
+    """Return the homography (3, 3) through four points, or the affine one through three."""
+    if len(plate_m) == 4:
+        H = cv2.getPerspectiveTransform(plate_m.astype(np.float32), rays.astype(np.float32))
+        return np.asarray(H, dtype=np.float64)
+    return np.vstack([cv2.getAffineTransform(plate_m.astype(np.float32), rays.astype(np.float32)), (0.0, 0.0, 1.0)])

@@ -1,0 +1,142 @@
+"""From measured disks and the depth plane to one pose, or the reason why there is none."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ghest_rt.geometry.so3 import Array
+from ghest_rt.messages.results import MarkerStatus
+from ghest_rt.vision.disk_centers import DiskCenters
+from ghest_rt.vision.layout import MarkerLayout
+from ghest_rt.vision.optics import Optics
+from ghest_rt.vision.planar_pose import Pose, mirrored
+from ghest_rt.vision.plate_plane import Plane
+from ghest_rt.vision.pose_fit import Centers, PoseFit, fit_pose
+
+_TRACKED_STEPS = 2
+_COLD_STEPS = 8
+_SIGMA_FLOOR_PX = 0.006  # pixel aliasing of an anti-aliased disk of a few pixels' radius
+_SIGMA_FACTOR = 1.3  # edges are noisier than interiors: colour and brightness model errors add there
+_MAX_DEVIATION_PX = 0.35
+_MAX_DEVIATION_SIGMAS = 12.0
+_MAX_PLANE_CHI2 = 60.0
+_MAX_PLANE_SCALE = 0.01  # disagreement of the plane with the colour pose, as a share of the distance, that is noise
+_SAME_POSE_RAD = 0.06
+_TELL_APART_CHI2 = 16.0
+_RANGE_M = (0.03, 2.0)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Solution:
+    """What became of one attempt.
+
+    Attributes:
+        status: OK or COLOR_ONLY with a fit, else the reason.
+        fit: The pose, if there is one.
+        disks: How many disks took part.
+    """
+
+    status: MarkerStatus
+    fit: PoseFit | None = None
+    disks: int = 0
+
+
+class Solver:
+    """Fuses the disks' centres with the plane and checks what comes out."""
+
+    def __init__(self, layout: MarkerLayout, optics: Optics) -> None:
+        self._layout = layout
+        self._optics = optics
+
+    def centers(self, measured: DiskCenters) -> Centers:
+        """Return the good disks' centres as rays."""
+        good = measured.good
+        rays = self._optics.disk_rays(measured.centers_px[good], measured.radius2_px[good])
+        sigma_px = np.hypot(_SIGMA_FLOOR_PX, _SIGMA_FACTOR * measured.sigma_px[good])
+        return Centers(self._layout.centers_m[good], rays, sigma_px / self._optics.mean_focal_px, self._layout.radius_m)
+
+    def track(self, centers: Centers, plane: Plane | None, start: Pose) -> Solution:
+        """Solve from a pose predicted by earlier frames."""
+        disks = len(centers.sigma)
+        if disks < 2 or (disks == 2 and plane is None):
+            return Solution(MarkerStatus.TOO_FEW_DISKS, disks=disks)
+        if plane is None:
+            return self._color_tracked(centers, start)
+        fit = fit_pose(*start, centers, plane, _TRACKED_STEPS)
+        return self._with_plane(centers, plane, fit, lambda c: self._color_tracked(c, start))
+
+    def cold(self, centers: Centers, plane: Plane | None, starts: tuple[Pose, Pose]) -> Solution:
+        """Solve from the two poses of a homography."""
+        disks = len(centers.sigma)
+        if disks < 2 or (disks < 4 and plane is None):
+            return Solution(MarkerStatus.TOO_FEW_DISKS, disks=disks)
+        if plane is None:
+            return self._color_cold(centers, starts)
+        normal = plane.theta / np.linalg.norm(plane.theta)
+        # The plane's normal points away from the camera, the marker's z axis towards it.
+        start = min(starts, key=lambda pose: float(pose[0][:, 2] @ normal))
+        fit = fit_pose(*start, centers, plane, _COLD_STEPS)
+        return self._with_plane(centers, plane, fit, lambda c: self._color_cold(c, starts))
+
+    def _with_plane(
+        self, centers: Centers, plane: Plane, fit: PoseFit | None, color_only: Callable[[Centers], Solution]
+    ) -> Solution:
+        """Judge a fit with depth; drop the disk or the plane that contradicts the rest."""
+        disks = len(centers.sigma)
+        if fit is not None and fit.plane_chi2 < _MAX_PLANE_CHI2 and self._plausible(fit, centers):
+            return self._checked(fit, MarkerStatus.OK, disks)
+        if disks < 4:
+            return Solution(MarkerStatus.BAD_FIT, disks=disks)
+        colored = color_only(centers)
+        if colored.fit is not None:
+            R, p_m = colored.fit.R, colored.fit.p_m
+            off = abs(float(plane.theta @ p_m) - 1.0)
+            tilt = float(np.linalg.norm(np.cross(R[:, 2], plane.theta)) / np.linalg.norm(plane.theta))
+            if fit is None or off > _MAX_PLANE_SCALE or tilt > _SAME_POSE_RAD or fit.plane_chi2 > _MAX_PLANE_CHI2:
+                return colored
+            return self._checked(fit, MarkerStatus.OK, disks)
+        if fit is None:
+            return colored
+        keep = np.arange(disks) != int(fit.deviations.argmax())
+        three = Centers(centers.plate_m[keep], centers.rays[keep], centers.sigma[keep], centers.radius_m)
+        fit = fit_pose(fit.R, fit.p_m, three, plane, _COLD_STEPS)
+        if fit is None or not self._plausible(fit, three) or fit.plane_chi2 > _MAX_PLANE_CHI2:
+            return Solution(MarkerStatus.BAD_FIT, disks=disks)
+        return self._checked(fit, MarkerStatus.OK, disks - 1)
+
+    def _color_tracked(self, centers: Centers, start: Pose) -> Solution:
+        """Solve without depth from a prediction; the mirrored pose takes over only if it is plainly better."""
+        disks = len(centers.sigma)
+        if disks < 3:
+            return Solution(MarkerStatus.TOO_FEW_DISKS, disks=disks)
+        fit = fit_pose(*start, centers, None, _COLD_STEPS)
+        if disks == 4 and fit is not None:
+            other = fit_pose(mirrored(fit.R, fit.p_m), fit.p_m, centers, None, _COLD_STEPS)
+            if other is not None and other.center_chi2 + _TELL_APART_CHI2 < fit.center_chi2:
+                fit = other
+        if fit is None or not self._plausible(fit, centers):
+            return Solution(MarkerStatus.BAD_FIT, disks=disks)
+        return self._checked(fit, MarkerStatus.COLOR_ONLY, disks)
+
+    def _color_cold(self, centers: Centers, starts: tuple[Pose, Pose]) -> Solution:
+        """Solve without depth or memory: one of the two poses must explain the image plainly better."""
+        disks = len(centers.sigma)
+        fits = [fit_pose(*start, centers, None, _COLD_STEPS) for start in starts]
+        sound = sorted((fit for fit in fits if fit is not None and fit.R[2, 2] < 0.0), key=lambda fit: fit.center_chi2)
+        if not sound or not self._plausible(sound[0], centers):
+            return Solution(MarkerStatus.BAD_FIT, disks=disks)
+        if len(sound) == 2:
+            apart = float(np.linalg.norm(sound[0].R - sound[1].R)) / 2**0.5
+            if apart > _SAME_POSE_RAD and sound[1].center_chi2 - sound[0].center_chi2 < _TELL_APART_CHI2:
+                return Solution(MarkerStatus.AMBIGUOUS, disks=disks)
+        return self._checked(sound[0], MarkerStatus.COLOR_ONLY, disks)
+
+    def _plausible(self, fit: PoseFit, centers: Centers) -> bool:
+        limit = np.maximum(_MAX_DEVIATION_PX / self._optics.mean_focal_px, _MAX_DEVIATION_SIGMAS * centers.sigma)
+        return bool((fit.deviations < limit).all()) and float(fit.R[:, 2] @ fit.p_m) < 0.0
+
+    def _checked(self, fit: PoseFit, status: MarkerStatus, disks: int) -> Solution:
+        if not _RANGE_M[0] <= float(fit.p_m[2]) <= _RANGE_M[1]:
+            return Solution(MarkerStatus.OUT_OF_RANGE, disks=disks)
+        return Solution(status, fit, disks)
