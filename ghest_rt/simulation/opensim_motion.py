@@ -3,14 +3,14 @@
 OpenSim's axes (X forwards, Y up, Z to the right) are E's by a rotation: X = -z, Y = x, Z = -y.
 
 Glenohumeral joint: `R = R_Y(plane_elv) R_-X(shoulder_elv) R_Y(axial_rot)`, scapula to humerus, taken over exactly. OpenSim's
-zero is the arm hanging with the elbow bending forwards; ours is the arm stretched forward. A fixed rotation converts the axes of
-the humerus: along the shaft (Y) is the arm's z, forwards (X, where the bent forearm points) its y, right (Z) its x.
+zero is the arm hanging with the elbow bending forwards; ours is the arm stretched forward. A fixed rotation converts the
+axes of the humerus: along the shaft (Y) is the arm's z, forwards (X, where the bent forearm points) its y, right (Z) its x.
 
 Thorax, clavicle and scapula: what is recorded against the first row is applied, since the seat puts the patient's resting
 posture where the exoskeleton needs it. Clavicle: protraction and elevation move the acromion. Scapula: its attitude on the
-thorax is composed of abduction (about the vertical), upward rotation (about the normal of the scapular plane, which is turned 35
-degrees to the side), elevation (tilt about the axis towards the glenoid) and winging (about the medial border, taken as
-vertical); the ellipsoid of the model is not reproduced. The elbow is not measured in such files: it is held at 90 degrees.
+thorax is composed of abduction (about the vertical), upward rotation (about the normal of the scapular plane, which is
+turned 35 degrees to the side), elevation (tilt about the axis towards the glenoid) and winging (about the medial border, taken
+as vertical); the ellipsoid of the model is not reproduced. The elbow is not measured in such files: it is held at 90 degrees.
 """
 
 import math
