@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ghest_drivers.samples import CameraInfo, EncoderSample, Intrinsics, RgbdFrame
 from ghest_rt.config.load import LoadedStation
-from ghest_rt.errors import BadInputError
+from ghest_rt.errors import BadInputError, GhestError
 from ghest_rt.messages.results import TruthSample
 from ghest_rt.recording import layout, rows
 
@@ -45,6 +45,7 @@ class RecordingWriter:
 
     Raises:
         BadInputError: The file cannot be created.
+        GhestError: From any method: the disk is full or gone.
         ValueError: `facts` holds the reserved key `format`.
     """
 
@@ -61,6 +62,7 @@ class RecordingWriter:
             self._file = path.open("wb")
         except OSError as error:
             raise BadInputError(f"{path}: cannot write the recording: {error.strerror or error}") from error
+        self._path = path
         self._writer = Writer(self._file, chunk_size=_CHUNK_BYTES, compression=_COMPRESSION[compression])
         self._schemas: dict[str, int] = {}
         self._channels: dict[str, int] = {}
@@ -141,12 +143,20 @@ class RecordingWriter:
         self._put(channel, 0, truth.t_ns, truth.t_ns, rows.truth_to_json(truth))
 
     def close(self) -> None:
-        """Write the index and close the file; harmless if done before."""
-        if not self._file.closed:
+        """Write the index and close the file; harmless if done before.
+
+        Raises:
+            GhestError: The disk is full or gone.
+        """
+        if self._file.closed:
+            return
+        try:
             try:
                 self._writer.finish()  # type: ignore[no-untyped-call]
             finally:
                 self._file.close()
+        except OSError as error:
+            raise self._failed(error) from error
 
     def _put(self, channel: int, seq: int, arrival_ns: int, capture_ns: int, data: bytes) -> None:
         if self._file.closed:
@@ -155,7 +165,14 @@ class RecordingWriter:
             raise ValueError("times in a recording are not negative")
         if not 0 <= seq < 1 << 32:
             raise ValueError(f"sequence number {seq} does not fit 32 bits")
-        self._writer.add_message(channel, log_time=arrival_ns, publish_time=capture_ns, sequence=seq, data=data)
+        try:
+            self._writer.add_message(channel, log_time=arrival_ns, publish_time=capture_ns, sequence=seq, data=data)
+            self._file.flush()  # what a chunk leaves in the buffer would be missing after a crash
+        except OSError as error:
+            raise self._failed(error) from error
+
+    def _failed(self, error: OSError) -> GhestError:
+        return GhestError(f"{self._path}: cannot write the recording: {error.strerror or error}; what was written can be read")
 
     def _image_channel(self, topic: str) -> int:
         return self._channel(topic, "protobuf", self._schema(layout.IMAGE_SCHEMA, "protobuf", layout.image_schema_data))

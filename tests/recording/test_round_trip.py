@@ -10,7 +10,7 @@ import pytest
 from mcap.reader import make_reader
 
 from ghest_drivers.samples import EncoderSample, RgbdFrame
-from ghest_rt.errors import BadInputError
+from ghest_rt.errors import BadInputError, GhestError
 from ghest_rt.messages.results import TruthSample
 from ghest_rt.recording.reader import Recording, open_recordings
 from ghest_rt.recording.writer import RecordingWriter
@@ -149,3 +149,9 @@ def test_the_writer_refuses_what_would_make_a_bad_recording(material: Any, tmp_p
             writer.write_encoder(EncoderSample(0, np.zeros(1), 0, -5, 0), ("j0",))
     with pytest.raises(ValueError, match="closed"):
         writer.write_encoder(EncoderSample(0, np.zeros(1), 0, 0, 0), ("j0",))
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
+def test_a_full_disk_is_told(material: Any) -> None:
+    with pytest.raises(GhestError, match=r"/dev/full: cannot write the recording: No space left"):
+        material.write(Path("/dev/full"))
