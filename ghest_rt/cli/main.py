@@ -22,12 +22,15 @@ app = typer.Typer(
     ),
 )
 
+_MOVEMENTS = "|".join(Movement)
 _Recording = Annotated[Path, typer.Argument(metavar="RECORDING", help="Recording (.mcap)", show_default=False)]
 _MethodOption = Annotated[
     Method | None,
     typer.Option(help="How markers are found and angles estimated; by default what the station file says", show_default=False),
 ]
-_Json = Annotated[bool, typer.Option("--json", help="Print one JSON document on standard output and nothing else there")]
+_Json = Annotated[
+    bool, typer.Option("--json", metavar="", help="Print one JSON document on standard output and nothing else there")
+]
 _Listen = Annotated[
     str | None,
     typer.Option(
@@ -36,8 +39,8 @@ _Listen = Annotated[
         show_default=False,
     ),
 ]
-_NoPublish = Annotated[bool, typer.Option("--no-publish", help="Do not open Zenoh at all")]
-_Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Log more, to standard error")]
+_NoPublish = Annotated[bool, typer.Option("--no-publish", metavar="", help="Do not open Zenoh at all")]
+_Verbose = Annotated[bool, typer.Option("--verbose", "-v", metavar="", help="Log more, to standard error")]
 
 
 @app.callback(invoke_without_command=True)
@@ -59,7 +62,7 @@ def root(
             help="Pace of the replay: 1 as recorded, 2.5 faster; 'max' publishes every sample as fast as the machine allows",
         ),
     ] = "1",
-    loop: Annotated[bool, typer.Option("--loop", help="Replay again and again until stopped")] = False,
+    loop: Annotated[bool, typer.Option("--loop", metavar="", help="Replay again and again until stopped")] = False,
     method: _MethodOption = None,
     station: Annotated[
         Path | None,
@@ -69,7 +72,7 @@ def root(
     no_publish: _NoPublish = False,
     as_json: _Json = False,
     verbose: _Verbose = False,
-    version: Annotated[bool, typer.Option("--version", help="Print the version")] = False,
+    version: Annotated[bool, typer.Option("--version", metavar="", help="Print the version")] = False,
 ) -> None:
     """Run from a recording with --replay, or use one of the commands."""
     from ghest_rt.cli.console import set_up_logging
@@ -99,19 +102,28 @@ def run(
     duration_s: Annotated[
         float | None, typer.Option("--duration", metavar="SECONDS", help="Stop after this long", show_default=False)
     ] = None,
+    movement: Annotated[
+        Movement,
+        typer.Option(help="What the patient of a simulated station does (Table 2)", case_sensitive=False, metavar=_MOVEMENTS),
+    ] = Movement.COMB,
+    sensor: Annotated[Sensor, typer.Option(help="The cameras of a simulated station")] = Sensor.PAPER,
+    seed: Annotated[int, typer.Option(metavar="N", help="Of a simulated station")] = 0,
     as_json: _Json = False,
 ) -> None:
-    """Run the service on a station's devices (real ones, or the simulated clinic)."""
+    """Run the service on a station's devices, real or simulated (backend 'sim', needs the extra 'sim')."""
     from ghest_rt.cli.run import RunOptions, run_station
 
-    run_station(RunOptions(station, method, listen, not no_publish, duration_s, as_json))
+    run_station(RunOptions(station, method, listen, not no_publish, duration_s, as_json, movement, sensor, seed))
 
 
 @app.command()
 def simulate(
     out: Annotated[Path, typer.Option(metavar="FILE", help="Recording to write (.mcap)", show_default=False)],
     movement: Annotated[
-        Movement | None, typer.Option(help="One of the paper's movements (Table 2)", show_default=False, case_sensitive=False)
+        Movement | None,
+        typer.Option(
+            help="One of the paper's movements (Table 2)", show_default=False, case_sensitive=False, metavar=_MOVEMENTS
+        ),
     ] = None,
     motion: Annotated[
         Path | None, typer.Option(metavar="FILE", help="OpenSim motion file (.mot) of a shoulder instead", show_default=False)
@@ -119,19 +131,41 @@ def simulate(
     sensor: Annotated[
         Sensor, typer.Option(help="paper: the paper's ideal sensor; sr300: 640x480 with the real one's faults")
     ] = (Sensor.PAPER),
-    seed: Annotated[int, typer.Option(help="The same seed gives the same bytes")] = 0,
+    seed: Annotated[int, typer.Option(metavar="N", help="The same seed gives the same bytes")] = 0,
     duration_s: Annotated[
         float | None, typer.Option("--duration", metavar="SECONDS", help="Only the first seconds", show_default=False)
     ] = None,
     arm: Annotated[Side, typer.Option(help="The patient's arm in the exoskeleton")] = Side.RIGHT,
     height_m: Annotated[float, typer.Option("--height", metavar="METRES", help="The patient's height")] = 1.75,
     marker: Annotated[MarkerTexture, typer.Option(help="What is printed on the marker plates")] = MarkerTexture.DISKS,
+    station: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Station file of your own instead of the shipped one", show_default=False),
+    ] = None,
     as_json: _Json = False,
 ) -> None:
     """Record a simulated patient in the exoskeleton, with the true angles (needs the extra 'sim')."""
-    from ghest_rt.cli.simulate import SimulateChoice, simulate_recording
+    from ghest_rt.cli.extras import need_simulation
 
-    simulate_recording(SimulateChoice(out, movement, motion, sensor, seed, duration_s, arm, height_m, marker, as_json))
+    need_simulation()
+    from ghest_rt.cli.simulate import simulate_recording
+    from ghest_rt.simulation.command import SimulateOptions
+
+    simulate_recording(
+        SimulateOptions(
+            out=out,
+            movement=None if movement is None else movement.value,
+            motion=motion,
+            sensor=sensor.value,
+            seed=seed,
+            duration_s=duration_s,
+            arm=arm.value,
+            height_m=height_m,
+            marker=marker.value,
+            station=station,
+        ),
+        as_json,
+    )
 
 
 @app.command()
@@ -171,7 +205,9 @@ def listen(
     count: Annotated[
         int | None, typer.Option(min=1, metavar="N", help="Stop after so many samples", show_default=False)
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the messages as they come, one JSON document a line")] = False,
+    as_json: Annotated[
+        bool, typer.Option("--json", metavar="", help="Print the messages as they come, one JSON document a line")
+    ] = False,
 ) -> None:
     """Print the angles that a running ghest-rt publishes."""
     from ghest_rt.cli.listen import listen_to
@@ -210,3 +246,7 @@ def main() -> None:
 def _fail(message: str, exit_code: int) -> None:
     sys.stderr.write(f"ghest-rt: {message}\n")
     sys.exit(exit_code)
+
+
+if __name__ == "__main__":
+    main()

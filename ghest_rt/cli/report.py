@@ -86,32 +86,35 @@ def print_reports(console: Console, reports: Sequence[RunReport], as_json: bool)
         print_json({"runs": [_document(report) for report in reports]})
         return
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0))
-    table.add_column("source", overflow="fold")
+    table.add_column("source", overflow="fold", min_width=10)
     for column in (
+        "method",
         "samples",
         "valid\n%",
         "rate\nHz",
-        "slots\nmissed",
-        "frames\nskipped",
-        "late p50/p99/max\nms",
-        "rms error\n° / mm",
+        "missed",
+        "late ms\np50/p99",
+        "rms error\n°/mm",
     ):
         table.add_column(column, justify="right", no_wrap=True)
     for report in reports:
         late = report.lateness
         table.add_row(
-            f"{report.source}, {report.method}",
+            report.source,
+            report.method,
             str(report.samples),
             f"{100.0 * report.valid_fraction:.2f}",
             f"{report.rate_hz:.2f}",
             "–" if report.missed_ticks is None else str(report.missed_ticks),
-            "–" if report.skipped_frames is None else str(report.skipped_frames),
-            "–" if late is None else f"{late.p50_us / 1e3:.2f}/{late.p99_us / 1e3:.2f}/{late.max_us / 1e3:.2f}",
+            "–" if late is None else f"{late.p50_us / 1e3:.2f}/{late.p99_us / 1e3:.2f}",
             "no truth"
             if report.orientation_rmse_deg is None
-            else f"{report.orientation_rmse_deg:.3f} / {report.position_rmse_mm:.3f}",
+            else f"{report.orientation_rmse_deg:.3f}/{report.position_rmse_mm:.3f}",
         )
     console.print(table)
+    for report in reports:
+        if report.skipped_frames:
+            console.print(f"{report.source}: {report.skipped_frames} frames skipped, vision was slower than the cameras")
 
 
 def _document(report: RunReport) -> dict[str, object]:

@@ -6,6 +6,7 @@ from functools import partial
 from pathlib import Path
 from statistics import fmean
 
+from rich import box
 from rich.console import Console
 from rich.progress import Progress, TaskID
 from rich.table import Table
@@ -62,20 +63,25 @@ def _mean(scores: Sequence[RecordingScore]) -> dict[str, float]:
 
 
 def _print_table(scores: Sequence[RecordingScore]) -> None:
-    table = Table(caption="Root mean square errors against the truth (the paper's metrics, 3.4.2)", caption_justify="left")
-    table.add_column("recording", overflow="fold")
-    for column in ("method", "orientation", "arm position", "marker m0", "marker m1", "samples", "valid"):
-        table.add_column(column, justify="right")
+    table = Table(
+        title="Root mean square errors against the truth (the paper's metrics, 3.4.2)",
+        title_justify="left",
+        box=box.SIMPLE_HEAD,
+        pad_edge=False,
+    )
+    table.add_column("recording", overflow="fold", min_width=10)
+    for column in ("method", "arm\n°", "arm\nmm", "m0\nmm", "m1\nmm", "samples", "valid\n%"):
+        table.add_column(column, justify="right", no_wrap=True)
     for score in scores:
         table.add_row(
             Path(score.recording).name,
             score.method,
-            f"{score.orientation_rmse_deg:.4f}°",
-            f"{score.position_rmse_m * 1000:.4f} mm",
-            f"{score.m0_rmse_m * 1000:.4f} mm",
-            f"{score.m1_rmse_m * 1000:.4f} mm",
+            f"{score.orientation_rmse_deg:.4f}",
+            f"{score.position_rmse_m * 1000:.4f}",
+            f"{score.m0_rmse_m * 1000:.4f}",
+            f"{score.m1_rmse_m * 1000:.4f}",
             str(score.samples),
-            f"{100 * score.valid_fraction:.2f} %",
+            f"{100 * score.valid_fraction:.2f}",
         )
     if len(scores) > 1:
         mean = _mean(scores)
@@ -83,12 +89,12 @@ def _print_table(scores: Sequence[RecordingScore]) -> None:
         table.add_row(
             "mean",
             "",
-            f"{mean['orientation_rmse_deg']:.4f}°",
-            f"{mean['position_rmse_m'] * 1000:.4f} mm",
-            f"{mean['m0_rmse_m'] * 1000:.4f} mm",
-            f"{mean['m1_rmse_m'] * 1000:.4f} mm",
+            f"{mean['orientation_rmse_deg']:.4f}",
+            f"{mean['position_rmse_m'] * 1000:.4f}",
+            f"{mean['m0_rmse_m'] * 1000:.4f}",
+            f"{mean['m1_rmse_m'] * 1000:.4f}",
             "",
-            f"{100 * mean['valid_fraction']:.2f} %",
+            f"{100 * mean['valid_fraction']:.2f}",
         )
     console = Console()
     console.print(table)

@@ -30,6 +30,7 @@ _log = logging.getLogger(__name__)
 _STOP_TIMEOUT_S = 0.7  # SIGTERM must end the service within a second, even if a device hangs in its close
 _HEALTH_PERIOD_NS = 1_000_000_000
 _ABSENT = ((ENCODERS, Reason.ENCODERS_SILENT), ("r0", Reason.R0_NO_FRAMES), ("r1", Reason.R1_NO_FRAMES))
+_CAME_TOO_LATE = (Reason.R0_NO_FRAMES, Reason.R1_NO_FRAMES, Reason.ENCODERS_SILENT)
 _LEVELS = {"info": logging.INFO, "warning": logging.WARNING, "error": logging.ERROR}
 
 
@@ -93,7 +94,7 @@ class ServiceSummary:
 
 
 class Service:
-    """Runs until `stop` is called or every input has ended."""
+    """Runs until `stop` is called, or until the cameras have ended (recordings do)."""
 
     def __init__(
         self,
@@ -143,7 +144,7 @@ class Service:
         self._stopping.set()
 
     async def run(self) -> ServiceSummary:
-        """Run until stopped or until every input has ended.
+        """Run until stopped, or until the cameras have ended and every sample they allow is published.
 
         Raises:
             DeviceError: An input that is not opened again (a recording) broke.
@@ -225,12 +226,10 @@ class Service:
         self._add(sample)
 
     def input_ended(self, source: str, error: Exception | None) -> None:
-        """Note that an input is through; the service ends when all are, and every sample they allow is published."""
+        """Note that an input is through."""
         self._ended.add(source)
         if error is not None:
             self._fail(DeviceError(f"{source}: {error}"))
-        elif len(self._ended) == len(self._counters) and len(self._last_capture_ns) < len(self._workers):
-            self.stop()  # ended without a frame: there is nothing to wait for
 
     # Inside.
 
@@ -275,8 +274,9 @@ class Service:
 
     def _tick(self, k: int, t_tick_ns: int) -> None:
         t_sample_ns = t_tick_ns - self._settings.lag_ns
-        all_ended = len(self._ended) == len(self._counters)
-        if all_ended and t_sample_ns > max(self._last_capture_ns.values(), default=0):
+        # Encoders alone give no angles: what counts is whether frames may still come.
+        no_more_frames = self._ended.issuperset(self._workers)
+        if no_more_frames and t_sample_ns > max(self._last_capture_ns.values(), default=0):
             self.stop()
             self._pacer.stop()
             return
@@ -284,7 +284,7 @@ class Service:
             estimate = self._waiting(t_sample_ns)
         else:
             estimate = self._pipeline.estimate(t_sample_ns)
-        if all_ended and estimate.status is Status.LOST:
+        if no_more_frames and estimate.reason in _CAME_TOO_LATE:
             estimate = replace(estimate, reason=Reason.END_OF_RECORDING)
         message = self._composer.compose(estimate, self._clock.now_ns())
         for output in self._outputs:

@@ -12,8 +12,8 @@ from ghest_rt.service.stop_signals import StopSignals
 _log = logging.getLogger(__name__)
 
 
-def run_service(service: Service, stop: StopSignals) -> ServiceSummary:
-    """Run to the end, or until a signal comes.
+def run_service(service: Service, stop: StopSignals, duration_s: float | None = None) -> ServiceSummary:
+    """Run to the end, until a signal comes, or for `duration_s`.
 
     Raises:
         GhestError: As `Service.run`.
@@ -23,11 +23,13 @@ def run_service(service: Service, stop: StopSignals) -> ServiceSummary:
         achieved.append("uvloop" if loop_factory else "asyncio's own event loop (the extra `rt` brings uvloop)")
         _log.debug("timing: %s", "; ".join(achieved))
         with asyncio.Runner(loop_factory=loop_factory) as runner:
-            return runner.run(_until_stopped(service, stop))
+            return runner.run(_until_stopped(service, stop, duration_s))
 
 
-async def _until_stopped(service: Service, stop: StopSignals) -> ServiceSummary:
+async def _until_stopped(service: Service, stop: StopSignals, duration_s: float | None) -> ServiceSummary:
     loop = asyncio.get_running_loop()
+    if duration_s is not None:
+        loop.call_later(duration_s, service.stop)
     with stop.calling(lambda: loop.call_soon_threadsafe(service.stop)):
         return await service.run()
 

@@ -1,0 +1,122 @@
+"""`ghest-rt run`: the service on the devices of a station."""
+
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rich.console import Console
+
+from ghest_rt.cli.extras import need_simulation
+from ghest_rt.cli.live import LiveFacts, LiveView
+from ghest_rt.cli.options import Method, Movement, Sensor
+from ghest_rt.cli.publishing import Publishing
+from ghest_rt.cli.report import print_reports, report_of
+from ghest_rt.cli.scoreboard import Scoreboard
+from ghest_rt.config.load import LoadedStation, load_station
+from ghest_rt.config.station import StationConfig
+from ghest_rt.errors import BadInputError
+from ghest_rt.estimation.pipeline import Method as PipelineMethod
+from ghest_rt.estimation.pipeline import Pipeline
+from ghest_rt.service.clocks import ScaledClock
+from ghest_rt.service.compose import AnglesComposer, Numbering
+from ghest_rt.service.devices import make_devices, uses_simulation
+from ghest_rt.service.loop import Service, ServiceSettings
+from ghest_rt.service.outputs import Output
+from ghest_rt.service.run import run_service
+from ghest_rt.service.stop_signals import StopSignals
+
+if TYPE_CHECKING:
+    from ghest_rt.cli.sim_world import LiveWorld
+
+_SIM_LEAD_NS = 1_000_000_000  # from building the simulated clinic to the first movement
+
+
+@dataclass(frozen=True, slots=True)
+class RunOptions:
+    """What the command line asks for.
+
+    Attributes:
+        station: Station file.
+        method: Overrides the station file's.
+        listen: Zenoh endpoint instead of the station file's.
+        publish: Whether to publish at all.
+        duration_s: Stop after this long; None for ever.
+        as_json: The summary as JSON.
+        movement: What a simulated patient does.
+        sensor: What a simulated station's cameras are.
+        seed: Of the simulation.
+    """
+
+    station: Path
+    method: Method | None
+    listen: str | None
+    publish: bool
+    duration_s: float | None
+    as_json: bool
+    movement: Movement
+    sensor: Sensor
+    seed: int
+
+
+def run_station(options: RunOptions) -> None:
+    """Run the service on a station's devices and print what it came to.
+
+    Raises:
+        GhestError: The station file, a device's backend or the endpoint cannot be used.
+    """
+    station = load_station(options.station)
+    _refuse_replay(station.config, options.station)
+    clock = ScaledClock()
+    world = _world(station, options, clock.now_ns() + _SIM_LEAD_NS)
+    if world is not None:
+        station = world.station
+    config = station.config
+    method: PipelineMethod = options.method.value if options.method is not None else config.estimator.method
+    cameras, encoders = make_devices(config, clock, world.device_settings if world is not None else {})
+    scoreboard = world.scoreboard if world is not None else Scoreboard()
+    with StopSignals() as stop, Publishing(config.publisher, options.listen, options.publish, lossless=False) as publishing:
+        facts = LiveFacts(config.station.id, method, publishing.endpoints, f"ghest/{config.station.id}/gh/angles")
+        publisher = publishing.publisher_for(config)
+        with LiveView(Console(stderr=True) if options.as_json else Console(), facts, scoreboard) as view:
+            outputs: list[Output] = [output for output in (publisher, world) if output is not None]
+            service = Service(
+                settings=ServiceSettings(config.rate_hz, round(config.estimator.lag_ms * 1e6)),
+                cameras=cameras,
+                encoders=encoders,
+                make_pipeline=lambda infos, joints: Pipeline(station, infos, joints, method),
+                composer=AnglesComposer(
+                    config.station.arm, method, config.calibration.id, time.time_ns() - clock.now_ns(), Numbering()
+                ),
+                outputs=(*outputs, view),
+                clock=clock,
+            )
+            summary = run_service(service, stop, options.duration_s)
+    print_reports(Console(), [report_of(config.station.id, method, summary, scoreboard)], options.as_json)
+
+
+def _refuse_replay(config: StationConfig, path: Path) -> None:
+    devices = {f"cameras.{name}": camera.device for name, camera in config.cameras.items()}
+    for key, device in {**devices, "encoders": config.encoders.device}.items():
+        if device.backend == "replay":
+            raise BadInputError(f"{path}: {key}.device.backend is replay; use ghest-rt --replay RECORDING --station {path}")
+
+
+def _world(station: LoadedStation, options: RunOptions, start_ns: int) -> "LiveWorld | None":
+    if not uses_simulation(station.config):
+        return None
+    need_simulation()
+    from ghest_rt.cli.sim_world import LiveWorld  # noqa: PLC0415  (needs the extra `sim`)
+    from ghest_rt.simulation.command import SimulateOptions  # noqa: PLC0415
+
+    return LiveWorld(
+        SimulateOptions(
+            out=Path(),
+            movement=options.movement.value,
+            sensor=options.sensor.value,
+            seed=options.seed,
+            arm=station.config.station.arm,
+            station=options.station,
+        ),
+        start_ns,
+    )

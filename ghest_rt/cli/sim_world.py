@@ -1,0 +1,54 @@
+"""The simulated clinic as the devices of a live run, with its truth. Needs the extra `sim` as soon as it is imported."""
+
+from ghest_rt.cli.scoreboard import Scoreboard
+from ghest_rt.config.load import LoadedStation
+from ghest_rt.messages.published import Event, GhAngles, Health
+from ghest_rt.messages.results import GhEstimate
+from ghest_rt.simulation.command import SimulateOptions, build_world
+from ghest_rt.simulation.world import World
+
+
+class LiveWorld:
+    """A simulated patient who starts to move at `start_ns`; as an output it tells a scoreboard the truth of every sample."""
+
+    def __init__(self, options: SimulateOptions, start_ns: int) -> None:
+        """Set up the clinic.
+
+        Args:
+            options: What to simulate; `out` is not used.
+            start_ns: The service clock's time at the beginning of the movement.
+
+        Raises:
+            BadInputError: An option cannot be used.
+            GhestError: The exoskeleton cannot follow the movement.
+        """
+        self._world: World = build_world(options)
+        self._start_ns = start_ns
+        self.scoreboard = Scoreboard()
+        self.scoreboard.set_time_axis(self.to_world_ns)
+
+    @property
+    def station(self) -> LoadedStation:
+        """The station, adjusted to this patient."""
+        return self._world.station
+
+    @property
+    def device_settings(self) -> dict[str, object]:
+        """What simulated devices are made with."""
+        return {"world": self._world, "start_ns": self._start_ns}
+
+    def to_world_ns(self, t_ns: int) -> int:
+        """Return the world's time of an instant of the service's clock."""
+        return t_ns - self._start_ns
+
+    def angles(self, message: GhAngles, estimate: GhEstimate) -> None:
+        """Tell the truth of this sample, then have it judged."""
+        if estimate.gh_from_arm is not None:
+            self.scoreboard.truth(self._world.truth_at(self.to_world_ns(estimate.t_sample_ns)))
+        self.scoreboard.angles(message, estimate)
+
+    def health(self, message: Health) -> None:
+        """Nothing to judge in it."""
+
+    def event(self, message: Event) -> None:
+        """Nothing to judge in it."""

@@ -1,0 +1,52 @@
+"""The devices that a station file names, through the driver layer's factory."""
+
+from collections.abc import Mapping
+
+from ghest_drivers.clock import Clock
+from ghest_drivers.errors import DriverError
+from ghest_drivers.factory import make_camera, make_encoders
+from ghest_drivers.interfaces import EncoderLink, RgbdCamera
+from ghest_rt.config.station import StationConfig
+from ghest_rt.errors import DeviceError
+
+SIM = "sim"
+
+
+def uses_simulation(config: StationConfig) -> bool:
+    """Return whether any of the station's devices is simulated."""
+    return SIM in {config.encoders.device.backend, *(camera.device.backend for camera in config.cameras.values())}
+
+
+def make_devices(
+    config: StationConfig, clock: Clock, sim_settings: Mapping[str, object]
+) -> tuple[dict[str, RgbdCamera], EncoderLink]:
+    """Make the station's cameras by name, and its encoder link; none is open yet.
+
+    Args:
+        config: The station.
+        clock: Host clock.
+        sim_settings: What simulated devices are made with: `world` and `start_ns`.
+
+    Raises:
+        DeviceError: A backend is unknown here, or the library that drives it is missing.
+    """
+
+    def settings(device: object, own: dict[str, object]) -> dict[str, object]:
+        return dict(sim_settings) if device == SIM else own
+
+    try:
+        cameras = {
+            name: make_camera(
+                camera.device.backend,
+                name,
+                clock,
+                settings(camera.device.backend, camera.device.model_dump(exclude={"backend"})),
+            )
+            for name, camera in config.cameras.items()
+        }
+        encoders = config.encoders
+        own = {**encoders.device.model_dump(exclude={"backend"}), "joints": encoders.joints}
+        link = make_encoders(encoders.device.backend, clock, settings(encoders.device.backend, own))
+    except DriverError as error:
+        raise DeviceError(str(error)) from error
+    return cameras, link
