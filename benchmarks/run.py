@@ -9,7 +9,7 @@ from typing import Any
 
 from rich.console import Console
 
-from benchmarks import footprint, loop, pose, throughput, tick
+from benchmarks import encoder_path, footprint, loop, pose, throughput, tick
 from benchmarks.plot import draw
 
 _OUT = Path(__file__).resolve().parents[1] / "out" / "benchmarks"
@@ -20,6 +20,7 @@ _BENCHMARKS: dict[str, Callable[[bool], dict[str, Any]]] = {
     "loop": loop.run,
     "memory": loop.memory,
     "footprint": footprint.run,
+    "encoders": encoder_path.run,
 }
 
 

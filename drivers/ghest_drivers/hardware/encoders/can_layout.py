@@ -1,7 +1,8 @@
 """CAN frames to raw readings, with the layout from a DBC file. Pure: frames in, readings out."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+import functools
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 from ghest_drivers.errors import BadDeviceData, DeviceNotFound
@@ -46,11 +47,13 @@ class _Part:
 
     Attributes:
         message: Its cantools definition.
-        places: (index of the channel, signal name) of the angles it carries.
+        places: (index of the channel, signal name, raw value to physical value) of the angles it carries.
+        extras: Names of the signals wanted raw besides: time and status.
     """
 
     message: Any
-    places: list[tuple[int, str]]
+    places: list[tuple[int, str, Callable[[float], float]]] = field(default_factory=list)
+    extras: list[str] = field(default_factory=list)
 
 
 class CanDecoder:
@@ -69,15 +72,18 @@ class CanDecoder:
         self._parts: dict[int, _Part] = {}
         for index, channel in enumerate(channels):
             key, signal = self._place(channel.source)
-            self._parts[key].places.append((index, signal.name))
+            to_physical = functools.partial(signal.conversion.raw_to_scaled, decode_choices=False)
+            self._parts[key].places.append((index, signal.name, to_physical))
         self._time: tuple[int, str, int] | None = None
         if layout.time_signal is not None:
             key, signal = self._place(layout.time_signal)
             self._time = (key, signal.name, signal.length)
+            self._parts[key].extras.append(signal.name)
         self._status: tuple[int, str] | None = None
         if layout.status_signal is not None:
             key, signal = self._place(layout.status_signal)
             self._status = (key, signal.name)
+            self._parts[key].extras.append(signal.name)
         self._counter_bits = self._common_bits(layout.counter_signal)
         self._checksummed = self._common_bits(layout.checksum_signal) is not None
         self._assembler = FrameAssembler(list(self._parts), layout.window_ns, stats)
@@ -116,7 +122,7 @@ class CanDecoder:
         ticks, status = whole.t_bus_ns, 0
         for key, part_values in whole.values.items():
             places = self._parts[key].places
-            for (index, _), value in zip(places, part_values, strict=False):
+            for (index, _, _), value in zip(places, part_values, strict=False):
                 counts[index] = value
             extra = len(places)
             if self._time is not None and self._time[0] == key:
@@ -133,12 +139,8 @@ class CanDecoder:
         except Exception:  # cantools raises several unrelated types for data that does not fit
             self._stats.rejected[Rejection.BAD_FRAME] += 1
             return None
-        by_name = part.message.get_signal_by_name
-        values = [float(by_name(name).conversion.raw_to_scaled(raw[name], decode_choices=False)) for _, name in part.places]
-        if self._time is not None and self._parts[self._time[0]] is part:
-            values.append(raw[self._time[1]])
-        if self._status is not None and self._parts[self._status[0]] is part:
-            values.append(raw[self._status[1]])
+        values = [to_physical(raw[name]) for _, name, to_physical in part.places]
+        values += [raw[name] for name in part.extras]
         counter = self._layout.counter_signal
         return tuple(values), None if counter is None else int(raw[counter])
 
@@ -156,7 +158,7 @@ class CanDecoder:
             ) from error
         if message.is_multiplexed():
             raise BadDeviceData(f"CAN signal {source!r}: multiplexed messages are not supported")
-        if self._parts.setdefault(key, _Part(message, [])).message is not message:
+        if self._parts.setdefault(key, _Part(message)).message is not message:
             raise BadDeviceData(f"CAN signal {source!r}: frame id {key:#x} is taken by another message")
         return key, signal
 
