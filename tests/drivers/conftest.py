@@ -12,7 +12,7 @@ from ghest_drivers.interfaces import EncoderLink, RgbdCamera
 from ghest_drivers.replay import ReplayPlayer
 from ghest_drivers.samples import CameraInfo, EncoderInfo, EncoderSample, Intrinsics, RgbdFrame
 from ghest_drivers.sim import SimCamera, SimEncoders
-from tests.hardware_encoders.contract_cases import armeo_encoders, can_encoders, serial_encoders
+from tests.hardware_encoders.contract_cases import armeo_encoders, can_encoders, canopen_encoders, serial_encoders
 
 SAMPLES = 8
 _PERIOD_NS = 4_000_000
@@ -123,6 +123,7 @@ ENCODER_CASES = {
     "sim": EncoderCase(sim_encoders, ends=True),
     "serial": EncoderCase(serial_encoders, ends=False),
     "can": EncoderCase(can_encoders, ends=False),
+    "canopen": EncoderCase(canopen_encoders, ends=False),
     "armeo": EncoderCase(armeo_encoders, ends=True),
 }
 

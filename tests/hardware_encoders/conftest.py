@@ -54,4 +54,4 @@ def channels() -> tuple[Channel, ...]:
 
 @pytest.fixture
 def serial_settings(pty_pair: PtyPair, channels: tuple[Channel, ...]) -> SerialSettings:
-    return SerialSettings(pty_pair.port, documented_format(3), channels, silent_s=0.5)
+    return SerialSettings(pty_pair.port, documented_format(3), channels, silent_s=5.0)

@@ -17,10 +17,12 @@ from ghest_drivers.hardware.encoders.armeo_export import ArmeoSettings, armeo_li
 from ghest_drivers.hardware.encoders.binary_frame import DOCUMENTED_RAD_PER_COUNT, documented_format
 from ghest_drivers.hardware.encoders.can_bus import CanBusSettings
 from ghest_drivers.hardware.encoders.can_link import CanEncoderLink, CanSettings
+from ghest_drivers.hardware.encoders.canopen_link import CanopenEncoderLink, CanopenSettings
 from ghest_drivers.hardware.encoders.channels import Channel
 from ghest_drivers.hardware.encoders.serial_link import SerialEncoderLink, SerialSettings
 from ghest_drivers.interfaces import EncoderLink
 from tests.hardware_encoders.can_senders import ARMEO_CHANNELS, ARMEO_LAYOUT, armeo_frames
+from tests.hardware_encoders.canopen_senders import NODES, Encoders
 
 _PERIOD_S = 0.004
 _SILENT_S = 60.0
@@ -81,6 +83,17 @@ async def can_encoders(silent: bool) -> AsyncIterator[EncoderLink]:
     yield CanEncoderLink(settings, MonotonicClock())
     await sender.stop()
     bus.shutdown()
+
+
+@asynccontextmanager
+async def canopen_encoders(silent: bool) -> AsyncIterator[EncoderLink]:
+    far_side = Encoders("contract canopen")
+    if silent:
+        far_side.silent.update(NODES)
+    channels = tuple(Channel(f"j{node}", str(node), rad_per_count=1e-4) for node in NODES)
+    bus = CanBusSettings("virtual", "contract canopen")
+    yield CanopenEncoderLink(CanopenSettings(bus, channels, silent_s=_SILENT_S), MonotonicClock())
+    far_side.close()
 
 
 @asynccontextmanager

@@ -31,12 +31,12 @@ def angles(seq: int) -> list[float]:
     return [round(0.1 * seq + joint, 2) for joint in range(7)]
 
 
-def settings(bus: CanBusSettings, silent_s: float = 1.0) -> CanSettings:
+def settings(bus: CanBusSettings, silent_s: float = 5.0) -> CanSettings:
     return CanSettings(bus, ARMEO_LAYOUT, ARMEO_CHANNELS, silent_s=silent_s)
 
 
 @asynccontextmanager
-async def virtual(request_name: str, silent_s: float = 1.0) -> AsyncIterator[tuple[CanEncoderLink, can.BusABC]]:
+async def virtual(request_name: str, silent_s: float = 5.0) -> AsyncIterator[tuple[CanEncoderLink, can.BusABC]]:
     bus = can.Bus(interface="virtual", channel=request_name)
     link = CanEncoderLink(settings(CanBusSettings("virtual", request_name), silent_s), MonotonicClock())
     await link.open()

@@ -85,6 +85,7 @@ def test_text_log_and_canopen_settings() -> None:
     assert (nodes.node_ids, nodes.bus.bitrate, nodes.sync_period_ms) == ((5, 6), 500_000, 10)
 
 
+A_SIGNAL = {"j0": {"source": "A.B", "deg_per_count": 1.0}}
 J0_DEG = {"j0": {"deg_per_count": 1.0}}
 SERIAL = {"backend": "serial", "port": "/dev/x"}
 
@@ -101,8 +102,8 @@ SERIAL = {"backend": "serial", "port": "/dev/x"}
         (["j0"], {"backend": "armeo", "path": "x.csv"}, "channels.j0.source: must be given"),
         (
             ["j0"],
-            {"backend": "can_log", "path": "x", "dbc": "none.dbc", "channels": {"j0": {"source": "A.B", "deg_per_count": 1}}},
-            r"none\.dbc: cannot read the DBC file",
+            {"backend": "can_log", "path": "x", "dbc": "none.dbc", "channels": A_SIGNAL},
+            r"none\.dbc: cannot read the DBC",
         ),
         (["j0"], {"backend": "sim"}, "the backend sim is no hardware"),
     ],
