@@ -13,14 +13,13 @@ import numpy as np
 
 from ghest_rt.geometry.so3 import Array
 from ghest_rt.vision.color_blobs import Blobs
-from ghest_rt.vision.layout import MarkerLayout
+from ghest_rt.vision.layout import PLATE_LEVEL, MarkerLayout
 from ghest_rt.vision.optics import Optics
 
 _COLOR_REACH = 0.24  # distance of chromaticities
 _PER_COLOR = 4
 _SKEW = 0.3  # difference of opposite sides, over the mean side
 _AREA_LOW, _AREA_HIGH = 0.55, 1.7
-_PLATE_LEVEL = 238.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,7 +43,7 @@ class ConstellationFinder:
     def __init__(self, layout: MarkerLayout, optics: Optics) -> None:
         self._layout = layout
         self._optics = optics
-        self._nominal = layout.disk_rgb / _PLATE_LEVEL
+        self._nominal = layout.disk_rgb / PLATE_LEVEL
         self._chroma = self._nominal / self._nominal.sum(axis=1, keepdims=True)
         side_m = 2.0 * np.abs(layout.centers_m).max()
         self._area_share = math.pi * layout.radius_m**2 / side_m**2
@@ -98,10 +97,8 @@ class ConstellationFinder:
 
     def _corner_cost(self, hidden: int, points: list[list[float]], areas: list[float]) -> float | None:
         """The same for three spots; the fourth is where it completes the parallelogram."""
-        full: list[list[float]] = []
         row = iter(points)
-        for k in range(4):
-            full.append([0.0, 0.0] if k == hidden else next(row))
+        full = [[0.0, 0.0] if k == hidden else next(row) for k in range(4)]
         opposite, one, other = 3 - hidden, *(k for k in range(4) if k not in (hidden, 3 - hidden))
         full[hidden] = [full[one][c] + full[other][c] - full[opposite][c] for c in range(2)]
         return self._square_cost(full, areas)

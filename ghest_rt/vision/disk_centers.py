@@ -6,54 +6,61 @@ alpha = <pixel / s - plate, disk - plate> / |disk - plate|^2. The alpha-weighted
 width and shape of the edge. What lies off the line from plate to disk colour is neither: something covers the disk.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ghest_rt.geometry.so3 import Array
-from ghest_rt.vision.ellipses import DiskImages
-from ghest_rt.vision.layout import MarkerLayout
+from ghest_rt.vision.ellipses import DiskImage, MarkerImage
+from ghest_rt.vision.layout import PLATE_LEVEL, MarkerLayout
 from ghest_rt.vision.plate_light import PlateLight
 
 Float32 = NDArray[np.float32]
+Places = list[tuple[float, float]]
 
 _FOREIGN2 = 0.3**2  # squared distance from the mixing line, in units of |disk - plate|, beyond which a pixel is foreign
 _MAX_FOREIGN = 0.02  # share of foreign pixels beyond which the disk counts as covered
 _AREA_RANGE = (0.8, 1.25)  # measured over predicted area
 _INSIDE_RANGE = (0.6, 1.6)  # mean alpha of the interior by the remembered colour
-_MIN_CONTRAST = 0.05  # least |disk - plate| used, in units of |plate|
+_LEAST_INSIDE = 0.2  # share of the radius that counts as interior whatever the band
+_MIN_CONTRAST2 = 0.05**2  # least |disk - plate|^2 used, in units of |plate|^2
 _MIN_MINOR_PX = 1.8  # a flatter or smaller ellipse has no interior to speak of
-_PLATE_LEVEL = 238.0  # what a channel of a white plate reads where the nominal colours are given
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class DiskCenters:
-    """What was measured of each disk.
+@dataclass(frozen=True, slots=True)
+class DiskCenter:
+    """One disk as measured.
 
     Attributes:
-        good: (4,) bool, whether the disk is wholly seen and looks as it should.
-        centers_px: (4, 2) centroids; meaningless where not good.
-        sigma_px: (4,) standard deviation of each coordinate by the image noise found inside the disks.
-        shift_px: Greatest distance of a good disk's centroid from where it was predicted.
-        radius2_px: (4, 1) squared geometric mean of the semi-axes.
-        relative: (4, 3) mean colour of the interiors, each channel divided by the plate's.
+        u: Centroid, pixels.
+        v: Centroid, pixels.
+        sigma_px: Standard deviation of each coordinate by the image noise found inside the disk.
+        radius2_px: Squared geometric mean of the predicted semi-axes.
+        relative: Mean colour of the interior, each channel divided by the plate's.
     """
 
-    good: NDArray[np.bool_]
-    centers_px: Array
-    sigma_px: Array
-    shift_px: float
-    radius2_px: Array
-    relative: Array
+    u: float
+    v: float
+    sigma_px: float
+    radius2_px: float
+    relative: tuple[float, float, float]
+
+
+DiskCenters = tuple[DiskCenter | None, ...]  # p0..p3, None where the disk is not wholly seen
 
 
 class DiskMeter:
-    """Measures the four disks at once, by their colours relative to the plate's, which it is told as they become known."""
+    """Measures the four disks at once, by their colours relative to the plate's, which it is told as they become known.
+
+    Attributes:
+        relative: (4, 3) the disks' colours, each channel divided by the plate's.
+    """
 
     def __init__(self, layout: MarkerLayout) -> None:
-        self._centers_m = layout.centers_m
-        self._nominal = layout.disk_rgb / _PLATE_LEVEL
+        self._centers_m = layout.centers_m.tolist()
+        self._nominal = layout.disk_rgb / PLATE_LEVEL
         self.relative = self._nominal
         self._grids: dict[int, tuple[Float32, Float32]] = {}
 
@@ -62,94 +69,82 @@ class DiskMeter:
         self.relative = self._nominal
 
     def measure(
-        self,
-        image: NDArray[np.uint8],
-        predicted: DiskImages,
-        light: PlateLight,
-        band_px: float,
-        centers_px: Array | None = None,
+        self, image: NDArray[np.uint8], predicted: MarkerImage, light: PlateLight, band_px: float, places: Places
     ) -> DiskCenters:
         """Measure the disks.
 
         Args:
             image: (H, W, 3) colour image.
-            predicted: Where the disks should appear.
+            predicted: What the disks should look like.
             light: The light on the plate.
             band_px: Half width of the band around the predicted edges; must cover half the edge's blur and the error of
-                the prediction.
-            centers_px: (4, 2) better centres than the predicted ones, if known.
+                the places.
+            places: Where the four centres are thought to be, pixels.
         """
         height, width = image.shape[:2]
-        centers_px = predicted.centers_px if centers_px is None else centers_px
-        minor_px = max(predicted.minor_px, 1e-3)
-        band = band_px / minor_px
+        if predicted.minor_px < _MIN_MINOR_PX:
+            return (None,) * 4
+        band = band_px / predicted.minor_px
         half = int(predicted.extent_px * (1.0 + band)) + 2
         size = 2 * half + 1
-        S = predicted.shapes_px2
-        determinants = S[:, 0, 0] * S[:, 1, 1] - S[:, 0, 1] ** 2
-        radius2_px = np.sqrt(determinants)[:, None]
-        reach_px = np.sqrt(S[:, (0, 1), (0, 1)]) * (1.0 + band)
-        border = np.minimum(centers_px - reach_px, (width - 1, height - 1) - centers_px - reach_px).min(axis=1)
-        usable = border >= 0.0
-        if minor_px < _MIN_MINOR_PX or size > min(height, width) or not usable.any():
-            return DiskCenters(np.zeros(4, dtype=bool), centers_px, np.ones(4), 0.0, radius2_px, self.relative)
-
-        corners = np.rint(centers_px).astype(np.intp) - half
-        np.clip(corners, 0, (width - size, height - size), out=corners)
-        pixels = np.empty((4, size, size, 3), dtype=np.float32)
-        for k, (u, v) in enumerate(corners.tolist()):
-            pixels[k] = image[v : v + size, u : u + size]
+        if size > min(height, width):
+            return (None,) * 4
         basis, moments = self._grid(half)
-        offsets = centers_px - corners - half
+        seen = [_inside(image, place, disk, 1.0 + band) for place, disk in zip(places, predicted.disks, strict=True)]
+        if not any(seen):
+            return (None,) * 4
+        corners = []
+        offsets = []
+        pixels = np.empty((4, size, size, 3), dtype=np.float32)
+        for k, (u, v) in enumerate(places):
+            left = min(max(round(u) - half, 0), width - size)
+            top = min(max(round(v) - half, 0), height - size)
+            pixels[k] = image[top : top + size, left : left + size]
+            corners.append((left + half, top + half))
+            offsets.append((u - left - half, v - top - half))
 
-        quad = _quadratics(S / determinants[:, None, None], offsets) @ basis  # 1 on the predicted edges
-        mixing, constant, bright = self._mixing(predicted, light, offsets)
-        flat = pixels.reshape(4, -1, 3)
-        mixed = mixing @ flat.transpose(0, 2, 1)
-        mixed *= (bright @ basis[:3])[:, None, :]
-        mixed -= constant
-        alpha = mixed[:, 0]
-        inside = quad < max(1.0 - band, 0.2) ** 2
+        quadratics = [_quadratic(disk, *offset) for disk, offset in zip(predicted.disks, offsets, strict=True)]
+        quad = np.array(quadratics, dtype=np.float32) @ basis  # 1 on the predicted edges
+        inside = quad < max(1.0 - band, _LEAST_INSIDE) ** 2
         near = quad < (1.0 + band) ** 2
-        n_inside = np.count_nonzero(inside, axis=1)
-        alpha_in = np.einsum("kn,kn->k", alpha, inside) / n_inside
-        usable &= (alpha_in > _INSIDE_RANGE[0]) & (alpha_in < _INSIDE_RANGE[1])
-        alpha /= np.where(usable, alpha_in, 1.0)[:, None].astype(np.float32)
+        rows, bright = self._mixing(predicted, light, offsets)
+        mix = np.array(rows, dtype=np.float32)
+        mixed = mix[:, :3].transpose(0, 2, 1) @ pixels.reshape(4, -1, 3).transpose(0, 2, 1)
+        mixed *= (np.array(bright, dtype=np.float32) @ basis[:3])[:, None, :]
+        mixed -= mix[:, 3, :, None]
 
-        filled = np.where(near, alpha, np.float32(0.0))
+        weight = inside.astype(np.float32)[:, None, :]
+        n_inside = np.add.reduce(weight, axis=2)
+        means = (weight @ mixed.transpose(0, 2, 1))[:, 0] / n_inside
+        alpha = mixed[:, 0]
+        alpha /= np.maximum(means[:, :1], _INSIDE_RANGE[0])
+        filled = alpha * near
         filled[inside] = 1.0
-        distance2 = np.einsum("kcn,kcn->kn", mixed[:, 1:], mixed[:, 1:])
-        off_inside = (filled - alpha) * near
-        distance2 += off_inside * off_inside
-        foreign = near & (distance2 > _FOREIGN2)
-        n_foreign = np.count_nonzero(foreign, axis=1)
+        np.subtract(filled, alpha, out=alpha)  # now zero in the band; inside and outside what the image should not hold
+        distance2 = np.einsum("kcn,kcn->kn", mixed, mixed)
+        foreign = (distance2 > _FOREIGN2) & near
+        n_foreign = np.add.reduce(foreign, axis=1)
         if n_foreign.any():
             filled[foreign] = quad[foreign] < 1.0
-        sums = filled @ moments
-        area = np.maximum(sums[:, 0], 1.0).astype(np.float64)
-        found = sums[:, 1:] / area[:, None] + corners + half
-        ratio = area / (np.pi * radius2_px[:, 0])
-        n_near = np.count_nonzero(near, axis=1)
-        good = (
-            usable & (n_foreign <= np.maximum(_MAX_FOREIGN * n_near, 1)) & (ratio > _AREA_RANGE[0]) & (ratio < _AREA_RANGE[1])
-        )
-        noise2 = np.einsum("kn,kn->k", off_inside, off_inside) / np.maximum(n_inside, 1)
-        sigma_px = np.sqrt(noise2 * (n_near - n_inside) * 0.5 * radius2_px[:, 0]) / area
-        shift_px = float(np.abs(found - centers_px)[good].max()) if good.any() else 0.0
-        inner_rgb = (inside.astype(np.float32)[:, None, :] @ flat)[:, 0] / n_inside[:, None]
-        relative = inner_rgb * bright[:, :1] / light.rgb
-        return DiskCenters(good, found, sigma_px, shift_px, radius2_px, relative)
+        sums = (filled @ moments).tolist()
+        scatter = ((weight @ distance2[:, :, None])[:, 0] / n_inside).tolist()
 
-    def _mixing(self, predicted: DiskImages, light: PlateLight, offsets: Array) -> tuple[Float32, Float32, Float32]:
-        """Return (4, 3, 3) rows (alpha, two across) and (4, 3, 1) constants per disk, and 1 / s in the patch's [1, u, v]."""
-        level = light.level * (1.0 + self._centers_m @ light.slope)
-        slope = (light.level * light.slope) @ np.linalg.inv(predicted.plate_px)
-        bright = np.empty((4, 3), dtype=np.float32)
-        bright[:, 1:] = -slope / (level * level)[:, None]
-        bright[:, 0] = 1.0 / level + (offsets @ slope) / (level * level)
-        plate = light.rgb
-        rows = np.array([_mixing_rows(plate.tolist(), relative) for relative in self.relative.tolist()])
-        return rows.astype(np.float32), (rows @ plate)[:, :, None].astype(np.float32), bright
+        found: list[DiskCenter | None] = []
+        for k, disk in enumerate(predicted.disks):
+            area, sum_u, sum_v = sums[k]
+            radius2 = math.sqrt(max(disk.determinant, 0.0))
+            a_in, b_in, c_in = means[k].tolist()
+            covered = n_foreign[k] > max(_MAX_FOREIGN * math.pi * radius2 * (1.0 + band) ** 2, 1.0)
+            whole = seen[k] and not covered and _INSIDE_RANGE[0] < a_in < _INSIDE_RANGE[1]
+            if not whole or not _AREA_RANGE[0] < area / (math.pi * radius2) < _AREA_RANGE[1]:
+                found.append(None)
+                continue
+            # Of the noise, a third is in alpha; it moves the centroid through the band, of area 4 pi r^2 band.
+            noise2 = max(scatter[k][0] - b_in * b_in - c_in * c_in, 0.0) / 3.0
+            sigma_px = math.sqrt(noise2 * 4.0 * math.pi * radius2 * band * 0.5 * radius2) / area
+            relative = _relative(rows[k], (a_in, b_in, c_in), light)
+            found.append(DiskCenter(corners[k][0] + sum_u / area, corners[k][1] + sum_v / area, sigma_px, radius2, relative))
+        return tuple(found)
 
     def _grid(self, half: int) -> tuple[Float32, Float32]:
         """Return [1, u, v, u^2, u v, v^2] (6, n) and [1, u, v] (n, 3) of a square patch of pixels around its middle."""
@@ -160,26 +155,62 @@ class DiskMeter:
             self._grids[half] = (np.stack([one, u, v, u * u, u * v, v * v]), np.stack([one, u, v], axis=1))
         return self._grids[half]
 
+    def _mixing(
+        self, predicted: MarkerImage, light: PlateLight, offsets: Places
+    ) -> tuple[list[list[list[float]]], list[tuple[float, float, float]]]:
+        """Return per disk its mixing rows (see `_mixing_rows`), and 1 / s as coefficients of the patch's [1, u, v]."""
+        a, b, c, d = predicted.plate_px
+        scale = light.level / (a * d - b * c)
+        slope_u, slope_v = scale * (d * light.slope[0] - c * light.slope[1]), scale * (a * light.slope[1] - b * light.slope[0])
+        bright = []
+        for (x_m, y_m), (u, v) in zip(self._centers_m, offsets, strict=True):
+            inverse = 1.0 / (light.level * (1.0 + x_m * light.slope[0] + y_m * light.slope[1]))
+            gu, gv = -slope_u * inverse * inverse, -slope_v * inverse * inverse
+            bright.append((inverse - gu * u - gv * v, gu, gv))
+        return [_mixing_rows(light.rgb, relative) for relative in self.relative.tolist()], bright
 
-def _quadratics(S_over_det: Array, offsets: Array) -> Float32:
-    """Return (4, 6): (x - o)^T S^-1 (x - o) as coefficients of [1, u, v, u^2, u v, v^2]."""
-    a, b, c = S_over_det[:, 1, 1], -S_over_det[:, 0, 1], S_over_det[:, 0, 0]
-    x, y = offsets[:, 0], offsets[:, 1]
-    ax_by, bx_cy = a * x + b * y, b * x + c * y
-    return np.stack([x * ax_by + y * bx_cy, -2 * ax_by, -2 * bx_cy, a, 2 * b, c], axis=1).astype(np.float32)
+
+def _inside(image: NDArray[np.uint8], place: tuple[float, float], disk: DiskImage, reach: float) -> bool:
+    """Whether the ellipse, grown by the factor `reach`, lies wholly in the image."""
+    du, dv = reach * math.sqrt(max(disk.a, 0.0)), reach * math.sqrt(max(disk.c, 0.0))
+    return du <= place[0] <= image.shape[1] - 1 - du and dv <= place[1] <= image.shape[0] - 1 - dv
 
 
-def _mixing_rows(plate: list[float], relative: list[float]) -> list[list[float]]:
-    """Return the rows that turn a colour into alpha and two coordinates across the line from plate to disk colour."""
-    x, y, z = ((r - 1.0) * p for p, r in zip(plate, relative, strict=True))
-    norm2 = max(x * x + y * y + z * z, _MIN_CONTRAST**2 * sum(p * p for p in plate))
-    # Any unit vector across v, and v times it: both of length 1 / |v|, so that all three coordinates have alpha's unit.
-    if abs(x) < abs(y):
-        flat = (y * y + z * z) ** 0.5 or 1.0
-        across = (0.0, -z / flat, y / flat)
+def _quadratic(disk: DiskImage, x: float, y: float) -> tuple[float, float, float, float, float, float]:
+    """Return (p - o)^T S^-1 (p - o) with o = (x, y) as coefficients of [1, u, v, u^2, u v, v^2]."""
+    inverse = 1.0 / max(disk.determinant, 1e-12)
+    a, b, c = disk.c * inverse, -disk.b * inverse, disk.a * inverse
+    au, av = a * x + b * y, b * x + c * y
+    return (x * au + y * av, -2.0 * au, -2.0 * av, a, 2.0 * b, c)
+
+
+def _mixing_rows(plate: tuple[float, float, float], relative: list[float]) -> list[list[float]]:
+    """Return what turns a colour into alpha and two coordinates across the line from plate to disk colour.
+
+    Four rows of three numbers: the factors of red, green and blue, and what to take off; all three coordinates have alpha's
+    unit, |disk - plate|.
+    """
+    p, q, r = plate
+    x, y, z = (relative[0] - 1.0) * p, (relative[1] - 1.0) * q, (relative[2] - 1.0) * r
+    norm2 = max(x * x + y * y + z * z, _MIN_CONTRAST2 * (p * p + q * q + r * r))
+    inverse = 1.0 / math.sqrt(norm2)
+    if abs(x) < abs(y):  # any unit vector across (x, y, z), and the one across both
+        flat = inverse / math.sqrt(y * y + z * z)
+        a, b, c = 0.0, -z * flat, y * flat
     else:
-        flat = (x * x + z * z) ** 0.5 or 1.0
-        across = (z / flat, 0.0, -x / flat)
-    norm = norm2**0.5
-    third = (y * across[2] - z * across[1], z * across[0] - x * across[2], x * across[1] - y * across[0])
-    return [[x / norm2, y / norm2, z / norm2], [a / norm for a in across], [t / norm2 for t in third]]
+        flat = inverse / (math.sqrt(x * x + z * z) or 1.0)
+        a, b, c = z * flat, 0.0, -x * flat
+    x, y, z = x / norm2, y / norm2, z / norm2
+    root = 1.0 / inverse
+    d, e, f = (y * c - z * b) * root, (z * a - x * c) * root, (x * b - y * a) * root
+    return [[x, a, d], [y, b, e], [z, c, f], [x * p + y * q + z * r, a * p + b * q + c * r, d * p + e * q + f * r]]
+
+
+def _relative(rows: list[list[float]], means: tuple[float, float, float], light: PlateLight) -> tuple[float, float, float]:
+    """Return a colour, given by its three mixing coordinates, with each channel divided by the plate's."""
+    norm2 = 1.0 / max(sum(row[0] * row[0] for row in rows[:3]), 1e-12)
+    red, green, blue = (
+        1.0 + norm2 * (row[0] * means[0] + row[1] * means[1] + row[2] * means[2]) / max(share, 1e-6)
+        for row, share in zip(rows, light.rgb, strict=False)
+    )
+    return red, green, blue

@@ -6,61 +6,81 @@ c = (m_z m_xy - G_xyz) / (m_z^2 - G_zz) and shape S = (G_xy - m_xy m_xy^T) / (m_
 (x - c)^T S^-1 (x - c) = 1. Its centre is *not* the image m_xy / m_z of the disk's centre: that is the perspective bias.
 """
 
+import math
 from dataclasses import dataclass
-
-import numpy as np
 
 from ghest_rt.geometry.so3 import Array
 from ghest_rt.vision.optics import Optics
 
+# The few numbers of a frame's four ellipses are plain floats: arrays this small cost more to call than to compute.
 
-@dataclass(frozen=True, slots=True, eq=False)
-class DiskImages:
-    """Where the disks should appear, in pixels.
+
+@dataclass(frozen=True, slots=True)
+class DiskImage:
+    """Where one disk should appear, in pixels: centre (u, v) and shape matrix S = [[a, b], [b, c]]."""
+
+    u: float
+    v: float
+    a: float
+    b: float
+    c: float
+
+    @property
+    def determinant(self) -> float:
+        """The fourth power of the geometric mean of the semi-axes."""
+        return self.a * self.c - self.b * self.b
+
+    @property
+    def minor_px(self) -> float:
+        """The smaller semi-axis."""
+        root = math.sqrt((self.a - self.c) ** 2 + 4.0 * self.b * self.b)
+        return math.sqrt(max(0.5 * (self.a + self.c - root), 0.0))
+
+
+@dataclass(frozen=True, slots=True)
+class MarkerImage:
+    """Where the marker should appear.
 
     Attributes:
-        centers_px: (n, 2) centres of the ellipses.
-        shapes_px2: (n, 2, 2) shape matrices S.
-        plate_px: (2, 2) derivative of pixels by plate coordinates (per metre) at the plate's centre.
-        minor_px: Least semi-axis of all ellipses.
-        extent_px: Greatest half width or half height of all ellipses.
+        disks: p0..p3.
+        plate_px: Derivatives u_X, u_Y, v_X, v_Y of pixels by plate coordinates (per metre) at the plate's centre.
+        minor_px: Least semi-axis of all disks.
+        extent_px: Greatest half width or half height of all disks.
     """
 
-    centers_px: Array
-    shapes_px2: Array
-    plate_px: Array
+    disks: tuple[DiskImage, DiskImage, DiskImage, DiskImage]
+    plate_px: tuple[float, float, float, float]
     minor_px: float
     extent_px: float
 
 
-def disk_images(H: Array, centers_m: Array, radius_m: float, optics: Optics) -> DiskImages | None:
-    """Return the images of the disks, or None if one is not wholly in front of the camera.
+def marker_image(H: Array, centers_m: list[list[float]], radius_m: float, optics: Optics) -> MarkerImage | None:
+    """Return the image of the marker, or None if a disk is not wholly in front of the camera.
 
     Args:
         H: (3, 3) homography from plate coordinates (metres) to rays.
-        centers_m: (n, 2) disk centres in the plate.
+        centers_m: Centres of the four disks in the plate.
         radius_m: Radius of the disks.
         optics: The colour camera's lens.
     """
-    images = [ellipse(H, x, y, radius_m) for x, y in centers_m.tolist()]
-    if None in images:
-        return None
-    numbers = np.array(images)
-    rays = numbers[:, :2]
-    S = numbers[:, (2, 3, 3, 4)].reshape(-1, 2, 2)
-    J = optics.jacobians(rays)
-    shapes_px2 = J @ S @ J.transpose(0, 2, 1)
-    a, b, c = shapes_px2[:, 0, 0], shapes_px2[:, 0, 1], shapes_px2[:, 1, 1]
-    minor2 = 0.5 * (a + c - np.sqrt((a - c) ** 2 + 4 * b * b))
-    weight = 1.0 / H[2, 2]
-    v = H[:2, 2] * weight
-    plate = (H[:2, :2] - np.outer(v, H[2, :2])) * weight
-    return DiskImages(
-        centers_px=optics.pixels(rays),
-        shapes_px2=shapes_px2,
-        plate_px=J.mean(axis=0) @ plate,
-        minor_px=float(np.sqrt(max(minor2.min(), 0.0))),
-        extent_px=float(np.sqrt(max(a.max(), c.max()))),
+    disks = []
+    for x_m, y_m in centers_m:
+        found = ellipse(H, x_m, y_m, radius_m)
+        if found is None:
+            return None
+        x, y, sxx, sxy, syy = found
+        u, v, ux, uy, vx, vy = optics.place(x, y)
+        pxx, pxy, pyx, pyy = ux * sxx + uy * sxy, ux * sxy + uy * syy, vx * sxx + vy * sxy, vx * sxy + vy * syy
+        disks.append(DiskImage(u, v, pxx * ux + pxy * uy, pxx * vx + pxy * vy, pyx * vx + pyy * vy))
+    (h00, h01, h02), (h10, h11, h12), (h20, h21, h22) = H.tolist()
+    x, y = h02 / h22, h12 / h22
+    _, _, ux, uy, vx, vy = optics.place(x, y)
+    xX, xY, yX, yY = (h00 - x * h20) / h22, (h01 - x * h21) / h22, (h10 - y * h20) / h22, (h11 - y * h21) / h22
+    return MarkerImage(
+        disks=(disks[0], disks[1], disks[2], disks[3]),
+        plate_px=(ux * xX + uy * yX, ux * xY + uy * yY, vx * xX + vy * yX, vx * xY + vy * yY),
+        minor_px=min(disk.minor_px for disk in disks),
+        extent_px=math.sqrt(max(max(disk.a, disk.c) for disk in disks)),
     )
 
 

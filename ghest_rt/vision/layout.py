@@ -10,6 +10,8 @@ from ghest_rt.geometry.so3 import Array
 # Disks p0..p3 stand at these multiples of the half spacing a: the order that eq. (5) takes for granted.
 DISK_SIGNS = np.array([[1.0, -1.0], [-1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 _WHITE_GRID = 9
+# What a channel of a white plate reads in the light under which the nominal colours are given.
+PLATE_LEVEL = 238.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -20,6 +20,7 @@ class Optics:
         self.height_px = intrinsics.height_px
         self.focal_px = np.array([intrinsics.fx_px, intrinsics.fy_px])
         self.center_px = np.array([intrinsics.cx_px, intrinsics.cy_px])
+        self._numbers = (intrinsics.fx_px, intrinsics.fy_px, intrinsics.cx_px, intrinsics.cy_px)
         self.mean_focal_px = float(self.focal_px.mean())
         self._k = intrinsics.distortion
         self.ideal = not any(intrinsics.distortion)
@@ -38,22 +39,24 @@ class Optics:
         out[:, 1] = y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y
         return out * self.focal_px + self.center_px
 
-    def jacobians(self, rays: Array) -> Array:
-        """Return (n, 2, 2): derivatives of pixels by rays."""
-        out = np.zeros((len(rays), 2, 2))
+    def place(self, x: float, y: float) -> tuple[float, float, float, float, float, float]:
+        """Return the pixel (u, v) of a ray and the derivatives u_x, u_y, v_x, v_y there."""
+        fx, fy, cx, cy = self._numbers
         if self.ideal:
-            out[:, 0, 0], out[:, 1, 1] = self.focal_px
-            return out
+            return fx * x + cx, fy * y + cy, fx, 0.0, 0.0, fy
         k1, k2, p1, p2, k3 = self._k
-        x, y = rays[:, 0], rays[:, 1]
         r2 = x * x + y * y
         radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
-        slope = 2.0 * (k1 + r2 * (2 * k2 + 3 * r2 * k3))
-        cross = x * y * slope + 2 * p1 * x + 2 * p2 * y
-        out[:, 0, 0] = radial + x * x * slope + 2 * p1 * y + 6 * p2 * x
-        out[:, 0, 1] = out[:, 1, 0] = cross
-        out[:, 1, 1] = radial + y * y * slope + 6 * p1 * y + 2 * p2 * x
-        return out * self.focal_px[:, None]
+        slope = 2.0 * (k1 + r2 * (2.0 * k2 + 3.0 * r2 * k3))
+        cross = x * y * slope + 2.0 * p1 * x + 2.0 * p2 * y
+        return (
+            fx * (x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x)) + cx,
+            fy * (y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y) + cy,
+            fx * (radial + x * x * slope + 2.0 * p1 * y + 6.0 * p2 * x),
+            fx * cross,
+            fy * cross,
+            fy * (radial + y * y * slope + 6.0 * p1 * y + 2.0 * p2 * x),
+        )
 
     def disk_rays(self, centroids_px: Array, radius2_px: NDArray[np.float64] | float) -> Array:
         """Return the rays (n, 2) through the centroids of small disk images (n, 2), as an undistorted image would show them.

@@ -20,15 +20,13 @@ class PlateLight:
 
     Attributes:
         level: Sum of the three channels at the plate's centre.
-        slope: (2,) relative change of brightness per metre along the plate's axes.
-        rgb: (3,) colour of the plate, summing to one.
-        clear: Share of the samples that look like the plate: less than one where something covers it.
+        slope: Relative change of brightness per metre along the plate's axes.
+        rgb: Colour of the plate, summing to one.
     """
 
     level: float
-    slope: Array
-    rgb: Array
-    clear: float
+    slope: tuple[float, float]
+    rgb: tuple[float, float, float]
 
 
 class PlateSampler:
@@ -45,28 +43,30 @@ class PlateSampler:
         points = H @ self._points
         pixels = np.rint(self._optics.pixels((points[:2] / points[2]).T)).astype(np.intp)
         u, v = pixels[:, 0], pixels[:, 1]
-        inside = None
-        if u.min() < 0 or v.min() < 0 or u.max() >= self._optics.width_px or v.max() >= self._optics.height_px:
-            inside = (u >= 0) & (v >= 0) & (u < self._optics.width_px) & (v < self._optics.height_px)
-            u, v = u[inside], v[inside]
-        if len(u) < _MIN_SAMPLES:
-            return None
-        rgb = image[v, u].astype(np.float64)
-        sums = rgb.sum(axis=1)
-        design = self._design if inside is None else self._design[inside]
-        plane = self._solve @ sums if inside is None else np.linalg.lstsq(design, sums, rcond=None)[0]
+        design, solve = self._design, self._solve
+        (u_low, v_low), (u_high, v_high) = pixels.min(axis=0).tolist(), pixels.max(axis=0).tolist()
+        if u_low < 0 or v_low < 0 or u_high >= self._optics.width_px or v_high >= self._optics.height_px:
+            inside = (pixels >= 0).all(axis=1) & (pixels < (self._optics.width_px, self._optics.height_px)).all(axis=1)
+            if np.count_nonzero(inside) < _MIN_SAMPLES:
+                return None
+            pixels, design = pixels[inside], design[inside]
+            solve = np.linalg.pinv(design)
+        rgb = image[pixels[:, 1], pixels[:, 0]].astype(np.float64)
+        sums = np.add.reduce(rgb, axis=1)
+        plane = solve @ sums
         good = np.abs(sums - design @ plane) < _OUTLIER * abs(plane[0])
         if not good.all():
-            good = np.abs(sums - np.median(sums)) < 2 * _OUTLIER * np.median(sums)
-            if good.sum() < _MIN_SAMPLES:
-                return None
-            plane = np.linalg.lstsq(design[good], sums[good], rcond=None)[0]
-            good = np.abs(sums - design @ plane) < _OUTLIER * abs(plane[0])
-            if good.sum() < _MIN_SAMPLES:
-                return None
-            plane = np.linalg.lstsq(design[good], sums[good], rcond=None)[0]
-            rgb = rgb[good]
-        if plane[0] < _MIN_LEVEL:
+            middle = np.median(sums)
+            good = np.abs(sums - middle) < 2 * _OUTLIER * middle
+            for _ in range(2):
+                if np.count_nonzero(good) < _MIN_SAMPLES:
+                    return None
+                plane = np.linalg.lstsq(design[good], sums[good], rcond=None)[0]
+                last, good = good, np.abs(sums - design @ plane) < _OUTLIER * abs(plane[0])
+            rgb = rgb[last]
+        level, slope_x, slope_y = plane.tolist()
+        if level < _MIN_LEVEL:
             return None
-        mean = rgb.mean(axis=0)
-        return PlateLight(float(plane[0]), plane[1:] / plane[0], mean / mean.sum(), float(good.mean()))
+        red, green, blue = np.add.reduce(rgb, axis=0).tolist()
+        total = red + green + blue
+        return PlateLight(level, (slope_x / level, slope_y / level), (red / total, green / total, blue / total))

@@ -4,6 +4,7 @@ In the frame of the depth camera the plane is theta . X = 1, so that along the r
 1/z = theta . (x, y, 1): linear in the ray, and with a noise that the fit of 1/z weighs evenly over the plate.
 """
 
+import math
 from dataclasses import dataclass
 
 import cv2
@@ -18,7 +19,10 @@ from ghest_rt.vision.registration import ray_grid
 
 _MIN_PIXELS = 40
 _MIN_SHARE = 0.3  # of the plate's pixels that must be measured and lie on the plane
-_SIGMAS = 3.5
+_SIGMAS = 4.0
+_FEW = 2e-3  # share of pixels beyond the gate for which another fit is not worth its time
+_MORE_FITS = 2
+_ROUNDING = 0.29  # standard deviation of a rounding error
 _FLOOR_COUNTS = 1.5  # no pixel is an outlier for being this near
 _MAX_SAMPLES = 3600
 _MIXED_PX = 1.2  # pixels along the plate's edge that may see past it
@@ -57,7 +61,7 @@ class PlateDepth:
         self._half_m = layout.half_plate_m
         self._corners = np.sign(layout.corners_m)
         rays = ray_grid(info.depth)
-        self._basis = np.stack([np.ones(rays.shape[:2]), rays[..., 0], rays[..., 1]]).astype(np.float32)
+        self._basis = np.stack([rays[..., 0], rays[..., 1], np.ones(rays.shape[:2])]).astype(np.float32)
 
     def fit(self, depth_counts: NDArray[np.uint16], depth_from_marker: Array, gates_m: tuple[float, ...]) -> Plane | None:
         """Return the plane in the depth camera's frame, or None if too little of the plate was measured.
@@ -73,40 +77,35 @@ class PlateDepth:
             return None
         rows, columns, mask = region
         basis = self._basis[:, rows, columns].reshape(3, -1)
-        middle = basis[1:, basis.shape[1] // 2].astype(np.float64)
-        basis[1:] -= middle.astype(np.float32)[:, None]
         counts = depth_counts[rows, columns].ravel()
-        usable = mask.ravel() & (counts > 0)
-        wanted = int(np.count_nonzero(mask))
+        usable = mask & (counts > 0)
+        wanted = max(int(np.count_nonzero(mask)), 1)
 
         n = depth_from_marker[:3, 2]
         theta = n / float(n @ depth_from_marker[:3, 3])
-        local = np.array([theta[0] * middle[0] + theta[1] * middle[1] + theta[2], theta[0], theta[1]])
+        slope = 1.0 / float(depth_from_marker[2, 3]) ** 2  # inverse metres per metre of depth
         inverse = np.float32(1.0 / self._unit_m) / np.maximum(counts, 1).astype(np.float32)
-        slope2 = float(local[0]) ** 2  # inverse metres per metre of depth
-        floor = _FLOOR_COUNTS * self._unit_m * slope2
-        gate = gates_m[0] * slope2
-        for step in range(len(gates_m) + 2):
-            residual = inverse - local.astype(np.float32) @ basis
-            used = usable & (np.abs(residual) < gate)
+        residual = inverse - theta.astype(np.float32) @ basis
+        gates = [gate_m * slope for gate_m in gates_m]
+        for step in range(len(gates) + _MORE_FITS):
+            gate = gates[step] if step < len(gates) else by_scatter
+            used = (np.abs(residual) < gate) & usable
             count = int(np.count_nonzero(used))
             if count < max(_MIN_PIXELS, _MIN_SHARE * wanted):
                 return None
             weighted = basis * used
-            normal = (weighted @ basis.T).astype(np.float64)
-            change = np.linalg.solve(normal, (weighted @ residual).astype(np.float64))
-            local = local + change
-            if step + 1 < len(gates_m):
-                gate = gates_m[step + 1] * slope2
-                continue
-            rest = (residual - change.astype(np.float32) @ basis)[used]
-            variance = float(rest @ rest) / (count - 3)
-            last, gate = gate, max(_SIGMAS * variance**0.5, floor)
-            if not bool((np.abs(rest) > gate).any()) or gate >= last:
+            inverse_normal = np.linalg.inv((weighted @ basis.T).astype(np.float64))
+            gradient = (weighted @ residual).astype(np.float64)
+            change = inverse_normal @ gradient
+            theta = theta + change
+            residual -= change.astype(np.float32) @ basis
+            inner = residual * used
+            variance = float(inner @ inner) / (count - 3)
+            by_scatter = max(_SIGMAS * math.sqrt(variance), _FLOOR_COUNTS * self._unit_m * slope)
+            if step + 1 >= len(gates) and np.count_nonzero(np.abs(inner) > by_scatter) <= _FEW * count:
                 break
-        covariance = np.linalg.inv(normal) * max(variance, (0.29 * self._unit_m * slope2) ** 2)
-        back = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, -middle[0], -middle[1]]])
-        return Plane(back @ local, back @ covariance @ back.T, count / wanted)
+        variance = max(variance, (_ROUNDING * self._unit_m * slope) ** 2)
+        return Plane(theta, inverse_normal * variance, count / wanted)
 
     def _region(self, pose: Array) -> tuple[slice, slice, NDArray[np.bool_]] | None:
         """Return the rows and columns (strided) that hold the plate, and which of their pixels lie well on it."""
@@ -126,4 +125,4 @@ class PlateDepth:
         mask = np.zeros((-(-height // step), -(-width // step)), dtype=np.uint8)
         polygon = np.rint((corners_px - low) * ((1 << _SHIFT_BITS) / step)).astype(np.int32)
         cv2.fillConvexPoly(mask, polygon, 1, lineType=cv2.LINE_8, shift=_SHIFT_BITS)
-        return slice(low[1], high[1], step), slice(low[0], high[0], step), mask.view(np.bool_)
+        return slice(low[1], high[1], step), slice(low[0], high[0], step), mask.view(np.bool_).ravel()

@@ -4,11 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ghest_rt.geometry.so3 import Array, exp_so3, skew
+from ghest_rt.geometry.so3 import Array, exp_so3
 from ghest_rt.vision.ellipses import ellipse
 from ghest_rt.vision.plate_plane import Plane
 
-_SMALL_STEP = 1e-6  # rad; metres are held to the same fraction of the distance
+_SMALL_STEP = 1e-3  # rad, and of the distance: the next Gauss-Newton step would be about the square of this
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -69,43 +69,60 @@ def fit_pose(R: Array, p_m: Array, centers: Centers, plane: Plane | None, max_st
     plane_information = None if plane is None else np.linalg.inv(plane.covariance)
     places = centers.plate_m.tolist()
     seen = centers.rays.ravel()
-    for step in range(max_steps + 1):
+    for step in range(max_steps):
         found = _center_terms(R, p_m, places, centers.radius_m)
         if found is None:
             return None
         predicted, J = found
-        residual = seen - predicted
-        scaled = residual * weights
         J *= weights[:, None]
+        residual = (seen - predicted) * weights
         information = J.T @ J
-        gradient = scaled @ J
-        plane_chi2 = 0.0
-        if plane is not None and plane_information is not None:
-            n = R[:, 2]
-            distance_m = float(n @ p_m)
-            off = plane.theta - n / distance_m
-            J_plane = np.empty((3, 6))
-            J_plane[:, :3] = -skew(n) / distance_m - np.outer(n, _cross(n, p_m)) / distance_m**2
-            J_plane[:, 3:] = -np.outer(n, n) / distance_m**2
-            pull = plane_information @ off
-            information += J_plane.T @ plane_information @ J_plane
-            gradient += pull @ J_plane
-            plane_chi2 = float(off @ pull)
-        center_chi2 = float(scaled @ scaled)
-        if step == max_steps:
-            break
+        gradient = residual @ J
+        if plane is not None:
+            off, J_plane = _plane_terms(R, p_m, plane)
+            weighted = plane_information @ J_plane
+            information += J_plane.T @ weighted
+            gradient += off @ weighted
         try:
             change = np.linalg.solve(information, gradient)
         except np.linalg.LinAlgError:
             return None
-        size = float(np.abs(change[:3]).max())
+        turn, shift = change[:3], change[3:]
+        size = max(float(np.abs(turn).max()), float(np.abs(shift).max()) / abs(float(p_m[2])))
         if not size < 1.0:
             return None
-        R = exp_so3(change[:3]) @ R
-        p_m = p_m + change[3:]
-        if size < _SMALL_STEP and float(np.abs(change[3:]).max()) < _SMALL_STEP * abs(float(p_m[2])):
+        R = exp_so3(turn) @ R
+        p_m = p_m + shift
+        if size < _SMALL_STEP or step + 1 == max_steps:
             break
-    return PoseFit(R, p_m, information, center_chi2, plane_chi2, np.hypot(residual[::2], residual[1::2]))
+    # What is left is linear in so small a last step.
+    residual -= J @ change
+    if plane is not None:
+        off -= J_plane @ change
+        plane_chi2 = float(off @ plane_information @ off)
+    else:
+        plane_chi2 = 0.0
+    deviations = np.hypot(residual[::2], residual[1::2]) * centers.sigma
+    return PoseFit(R, p_m, information, float(residual @ residual), plane_chi2, deviations)
+
+
+def _plane_terms(R: Array, p_m: Array, plane: Plane) -> tuple[Array, Array]:
+    """Return the residual of theta = n / (n . p) (3,) and the Jacobian (3, 6) of the prediction."""
+    n = R[:, 2]
+    nx, ny, nz = n.tolist()
+    px, py, pz = p_m.tolist()
+    inverse = 1.0 / (nx * px + ny * py + nz * pz)
+    tx, ty, tz = nx * inverse, ny * inverse, nz * inverse
+    # d theta = w x n / d - n / d^2 (w . (n x p) + n . t)
+    cx, cy, cz = (ny * pz - nz * py) * inverse, (nz * px - nx * pz) * inverse, (nx * py - ny * px) * inverse
+    J = np.array(
+        [
+            [-tx * cx, tz - tx * cy, -ty - tx * cz, -tx * tx, -tx * ty, -tx * tz],
+            [-tz - ty * cx, -ty * cy, tx - ty * cz, -ty * tx, -ty * ty, -ty * tz],
+            [ty - tz * cx, -tx - tz * cy, -tz * cz, -tz * tx, -tz * ty, -tz * tz],
+        ]
+    )
+    return plane.theta - np.array([tx, ty, tz]), J
 
 
 def _center_terms(R: Array, p_m: Array, places: list[list[float]], radius_m: float) -> tuple[Array, Array] | None:
@@ -125,9 +142,3 @@ def _center_terms(R: Array, p_m: Array, places: list[list[float]], radius_m: flo
         rows.append([ry * au, rz * inverse - rx * au, -ry * inverse, inverse, 0.0, au])
         rows.append([ry * av - rz * inverse, -rx * av, rx * inverse, 0.0, inverse, av])
     return np.array(predicted), np.array(rows)
-
-
-def _cross(a: Array, b: Array) -> Array:
-    a0, a1, a2 = a.tolist()
-    b0, b1, b2 = b.tolist()
-    return np.array([a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0])

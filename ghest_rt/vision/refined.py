@@ -13,7 +13,7 @@ from ghest_rt.vision.checks import check_frame
 from ghest_rt.vision.color_blobs import BlobFinder
 from ghest_rt.vision.constellation import ConstellationFinder
 from ghest_rt.vision.disk_centers import DiskCenters, DiskMeter
-from ghest_rt.vision.ellipses import disk_images
+from ghest_rt.vision.ellipses import marker_image
 from ghest_rt.vision.layout import MarkerLayout
 from ghest_rt.vision.motion import MotionTrack
 from ghest_rt.vision.optics import Optics
@@ -54,6 +54,7 @@ class RefinedDetector:
         self._marker = marker_name
         self._info = info
         self._layout = MarkerLayout.of(marker)
+        self._centers_m: list[list[float]] = self._layout.centers_m.tolist()
         self._optics = Optics(info.color)
         self._sampler = PlateSampler(self._layout, self._optics)
         self._meter = DiskMeter(self._layout)
@@ -163,20 +164,23 @@ class RefinedDetector:
 
     def _look(self, image: NDArray[np.uint8], H: Array, band_px: float) -> DiskCenters | MarkerStatus:
         """Measure the disks that a homography predicts, again where they turn out to be off."""
-        images = disk_images(H, self._layout.centers_m, self._layout.radius_m, self._optics)
+        predicted = marker_image(H, self._centers_m, self._layout.radius_m, self._optics)
         light = self._sampler(image, H)
-        if images is None or light is None:
+        if predicted is None or light is None:
             return MarkerStatus.NOT_FOUND
         self._light = light
-        centers_px = None
+        places = [(disk.u, disk.v) for disk in predicted.disks]
         for look in range(_MAX_LOOKS):
-            band = max(min(band_px, _BAND_OF_MARGIN * self._margin * images.minor_px), 1.0)
-            measured = self._meter.measure(image, images, light, band, centers_px)
-            if look + 1 == _MAX_LOOKS or measured.shift_px < _CENTERED_PX or not measured.good.any():
+            band = max(min(band_px, _BAND_OF_MARGIN * self._margin * predicted.minor_px), 1.0)
+            measured = self._meter.measure(image, predicted, light, band, places)
+            shifts = [(disk.u - u, disk.v - v) for disk, (u, v) in zip(measured, places, strict=True) if disk is not None]
+            if not shifts or look + 1 == _MAX_LOOKS or max(max(abs(du), abs(dv)) for du, dv in shifts) < _CENTERED_PX:
                 break
-            before = images.centers_px if centers_px is None else centers_px
-            shift = (measured.centers_px - before)[measured.good].mean(axis=0)
-            centers_px = np.where(measured.good[:, None], measured.centers_px, before + shift)
+            mean_u, mean_v = (sum(shift[c] for shift in shifts) / len(shifts) for c in range(2))
+            places = [
+                (u + mean_u, v + mean_v) if disk is None else (disk.u, disk.v)
+                for disk, (u, v) in zip(measured, places, strict=True)
+            ]
             band_px = _BAND_PX
         return measured
 
@@ -211,12 +215,13 @@ class RefinedDetector:
 
     def _learn(self, measured: DiskCenters) -> None:
         """Let the remembered colours of disks and light follow what was seen."""
-        good = measured.good[:, None]
-        relative = self._meter.relative
-        self._meter.relative = np.where(good, relative + _LEARN * (measured.relative - relative), relative)
+        relative = self._meter.relative.copy()
+        for k, disk in enumerate(measured):
+            if disk is not None:
+                relative[k] += _LEARN * (np.array(disk.relative) - relative[k])
+        self._meter.relative = relative
         if self._light is not None:
-            red, green, blue = (3.0 * self._light.rgb).tolist()
-            self._white = (red, green, blue)
+            self._white = self._light.rgb
 
 
 def _homography(plate_m: Array, rays: Array) -> Array:

@@ -1,11 +1,11 @@
 """From measured disks and the depth plane to one pose, or the reason why there is none."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
-from ghest_rt.geometry.so3 import Array
 from ghest_rt.messages.results import MarkerStatus
 from ghest_rt.vision.disk_centers import DiskCenters
 from ghest_rt.vision.layout import MarkerLayout
@@ -14,7 +14,7 @@ from ghest_rt.vision.planar_pose import Pose, mirrored
 from ghest_rt.vision.plate_plane import Plane
 from ghest_rt.vision.pose_fit import Centers, PoseFit, fit_pose
 
-_TRACKED_STEPS = 2
+_TRACKED_STEPS = 4
 _COLD_STEPS = 8
 _SIGMA_FLOOR_PX = 0.006  # pixel aliasing of an anti-aliased disk of a few pixels' radius
 _SIGMA_FACTOR = 1.3  # edges are noisier than interiors: colour and brightness model errors add there
@@ -51,10 +51,11 @@ class Solver:
 
     def centers(self, measured: DiskCenters) -> Centers:
         """Return the good disks' centres as rays."""
-        good = measured.good
-        rays = self._optics.disk_rays(measured.centers_px[good], measured.radius2_px[good])
-        sigma_px = np.hypot(_SIGMA_FLOOR_PX, _SIGMA_FACTOR * measured.sigma_px[good])
-        return Centers(self._layout.centers_m[good], rays, sigma_px / self._optics.mean_focal_px, self._layout.radius_m)
+        seen = [(k, disk) for k, disk in enumerate(measured) if disk is not None]
+        places = np.array([(disk.u, disk.v) for _, disk in seen]).reshape(-1, 2)
+        rays = self._optics.disk_rays(places, np.array([[disk.radius2_px] for _, disk in seen]).reshape(-1, 1))
+        sigma = [math.hypot(_SIGMA_FLOOR_PX, _SIGMA_FACTOR * disk.sigma_px) / self._optics.mean_focal_px for _, disk in seen]
+        return Centers(self._layout.centers_m[[k for k, _ in seen]], rays, np.array(sigma), self._layout.radius_m)
 
     def track(self, centers: Centers, plane: Plane | None, start: Pose) -> Solution:
         """Solve from a pose predicted by earlier frames."""
