@@ -115,6 +115,7 @@ class _Replayer:
 
     def replay(self, recording: Recording, station: LoadedStation) -> RunReport:
         """Play a recording to its end or until a signal comes."""
+        _log.info("replaying %s", recording.path)
         config = station.config
         method = self._options.method.value if self._options.method is not None else config.estimator.method
         publisher = self._publishing.publisher_for(config)
