@@ -50,12 +50,12 @@ class Anatomy:
     def exoskeleton_settings_m(self) -> dict[str, float]:
         """Return the prismatic settings a therapist would make, to the 5 mm marks of the scales.
 
-        The upper-arm link is set 45 mm longer than the arm, to reach where the arm does; the forearm module follows the
-        forearm.
+        The upper-arm link is set 45 mm longer than the arm, to reach where the arm does; the forearm module follows
+        half of the difference between forearms, since its splint is long.
         """
         mark = 0.005
         upper = round((self.upper_arm_m + 0.045 - 0.225) / mark) * mark
-        fore = round((self.forearm_m - 0.146 * _REFERENCE_HEIGHT_M) / mark) * mark
+        fore = round(0.5 * (self.forearm_m - 0.146 * _REFERENCE_HEIGHT_M) / mark) * mark
         return {"j3_length": round(upper, 6), "j5": 0.0, "j7": round(fore, 6) + 0.0}
 
 

@@ -30,11 +30,12 @@ _REFUSAL_M = 0.005
 
 
 class ExoskeletonMotion:
-    """Joint positions of the exoskeleton over the whole movement: a spline, which *is* the truth at every instant.
+    """Joint positions of the exoskeleton over a movement: a spline, which *is* the truth at every instant.
 
     Args:
         scene: The clinic.
         motion: What the patient does.
+        duration_s: How much of the movement is wanted.
         settings_m: Prismatic joints set for the patient.
         urdf_text: The exoskeleton.
         source: Where it came from, for messages.
@@ -43,10 +44,19 @@ class ExoskeletonMotion:
         GhestError: The exoskeleton cannot follow this movement.
     """
 
-    def __init__(self, scene: Scene, motion: Motion, settings_m: dict[str, float], urdf_text: str, source: str) -> None:
+    def __init__(
+        self,
+        scene: Scene,
+        motion: Motion,
+        *,
+        duration_s: float,
+        settings_m: dict[str, float],
+        urdf_text: str,
+        source: str,
+    ) -> None:
         self._names = tuple(scene.joint_address)
         step_s = 1.0 / _RATE_HZ
-        times = np.arange(-_PAD_S, motion.duration_s + _PAD_S + step_s, step_s)
+        times = np.arange(-_PAD_S, duration_s + _PAD_S + step_s, step_s)
         follower = _Follower(scene, settings_m, urdf_text, source)
         self._spline = CubicSpline(times, np.array([follower.solve(motion, float(t)) for t in times]))
         self._fixed = {self._names.index(name): value for name, value in settings_m.items()}

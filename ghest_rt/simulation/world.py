@@ -65,7 +65,9 @@ class World:
             raise BadInputError(
                 f"{station.source}: the URDF has no joint {', '.join(unknown)}; see encoders.joints and settings_m"
             )
-        exoskeleton = ExoskeletonMotion(scene, motion, settings, station.urdf_text, station.source)
+        exoskeleton = ExoskeletonMotion(
+            scene, motion, duration_s=duration, settings_m=settings, urdf_text=station.urdf_text, source=station.source
+        )
         self.station = station
         self.timeline = Timeline(duration)
         self._clinic = Clinic(scene, config, motion, exoskeleton)
