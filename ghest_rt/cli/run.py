@@ -73,7 +73,7 @@ def run_station(options: RunOptions) -> None:
         station = world.station
     config = station.config
     method: PipelineMethod = options.method.value if options.method is not None else config.estimator.method
-    cameras, encoders = make_devices(config, clock, world.device_settings if world is not None else {})
+    cameras, encoders = make_devices(station, clock, world.device_settings if world is not None else {})
     scoreboard = world.scoreboard if world is not None else Scoreboard()
     with StopSignals() as stop, Publishing(config.publisher, options.listen, options.publish, lossless=False) as publishing:
         facts = LiveFacts(config.station.id, method, publishing.endpoints, f"ghest/{config.station.id}/gh/angles")

@@ -6,8 +6,10 @@ from ghest_drivers.clock import Clock
 from ghest_drivers.errors import DriverError
 from ghest_drivers.factory import make_camera, make_encoders
 from ghest_drivers.interfaces import EncoderLink, RgbdCamera
+from ghest_rt.config.load import LoadedStation
 from ghest_rt.config.station import StationConfig
 from ghest_rt.errors import DeviceError
+from ghest_rt.service.encoder_device import make_encoder_link
 
 SIM = "sim"
 
@@ -18,18 +20,20 @@ def uses_simulation(config: StationConfig) -> bool:
 
 
 def make_devices(
-    config: StationConfig, clock: Clock, sim_settings: Mapping[str, object]
+    station: LoadedStation, clock: Clock, sim_settings: Mapping[str, object]
 ) -> tuple[dict[str, RgbdCamera], EncoderLink]:
     """Make the station's cameras by name, and its encoder link; none is open yet.
 
     Args:
-        config: The station.
+        station: The station.
         clock: Host clock.
         sim_settings: What simulated devices are made with: `world` and `start_ns`.
 
     Raises:
         DeviceError: A backend is unknown here, or the library that drives it is missing.
+        BadInputError: The encoders' settings do not fit together, or a file they name cannot be read.
     """
+    config = station.config
 
     def settings(device: object, own: dict[str, object]) -> dict[str, object]:
         return dict(sim_settings) if device == SIM else own
@@ -44,9 +48,10 @@ def make_devices(
             )
             for name, camera in config.cameras.items()
         }
-        encoders = config.encoders
-        own = {**encoders.device.model_dump(exclude={"backend"}), "joints": encoders.joints}
-        link = make_encoders(encoders.device.backend, clock, settings(encoders.device.backend, own))
+        if config.encoders.device.backend == SIM:
+            link = make_encoders(SIM, clock, dict(sim_settings))
+        else:
+            link = make_encoder_link(station, clock)
     except DriverError as error:
         raise DeviceError(str(error)) from error
     return cameras, link
