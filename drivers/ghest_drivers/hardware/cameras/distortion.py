@@ -23,10 +23,12 @@ class DistortionFit:
 
     Attributes:
         coefficients: (k1, k2, p1, p2, k3).
-        max_error_px: The greatest distance between where the two models put a point.
+        rms_error_px: Distance between where the two models put a point, root mean square.
+        max_error_px: The greatest, in the corners.
     """
 
     coefficients: PlumbBob
+    rms_error_px: float
     max_error_px: float
 
 
@@ -53,4 +55,5 @@ def fit_plumb_bob(ideal: Points, distorted: Points, focal_px: float) -> Distorti
     shift = np.concatenate([distorted[:, 0] - x, distorted[:, 1] - y])
     k1, k2, p1, p2, k3 = (float(value) for value in np.linalg.lstsq(design, shift, rcond=None)[0])
     residual = (design @ np.array([k1, k2, p1, p2, k3]) - shift).reshape(2, -1)
-    return DistortionFit((k1, k2, p1, p2, k3), float(np.hypot(*residual).max()) * focal_px)
+    error_px = np.hypot(residual[0], residual[1]) * focal_px
+    return DistortionFit((k1, k2, p1, p2, k3), float(np.sqrt(np.mean(error_px**2))), float(error_px.max()))

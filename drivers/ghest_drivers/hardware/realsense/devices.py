@@ -56,7 +56,7 @@ def find_device(context: Any, serial: str) -> Any:
         facts = describe(device)
         present.append(f"{facts.model} {facts.serial}")
     raise DeviceNotFound(
-        f"no RealSense camera with serial number {serial}; connected: {', '.join(present) or 'none'}. "
+        f"no RealSense camera with serial number {serial}; connected: {', '.join(sorted(present)) or 'none'}. "
         "Check the cable and the serial number in the station file"
     )
 
