@@ -106,14 +106,13 @@ def run(
         Movement,
         typer.Option(help="What the patient of a simulated station does (Table 2)", case_sensitive=False, metavar=_MOVEMENTS),
     ] = Movement.COMB,
-    sensor: Annotated[Sensor, typer.Option(help="The cameras of a simulated station")] = Sensor.PAPER,
     seed: Annotated[int, typer.Option(metavar="N", help="Of a simulated station")] = 0,
     as_json: _Json = False,
 ) -> None:
     """Run the service on a station's devices, real or simulated (backend 'sim', needs the extra 'sim')."""
     from ghest_rt.cli.run import RunOptions, run_station
 
-    run_station(RunOptions(station, method, listen, not no_publish, duration_s, as_json, movement, sensor, seed))
+    run_station(RunOptions(station, method, listen, not no_publish, duration_s, as_json, movement, seed))
 
 
 @app.command()

@@ -9,10 +9,11 @@ from rich.console import Console
 
 from ghest_rt.cli.extras import need_simulation
 from ghest_rt.cli.live import LiveFacts, LiveView
-from ghest_rt.cli.options import Method, Movement, Sensor
+from ghest_rt.cli.options import Method, Movement
 from ghest_rt.cli.publishing import Publishing
 from ghest_rt.cli.report import print_reports, report_of
 from ghest_rt.cli.scoreboard import Scoreboard
+from ghest_rt.config.devices import SimBackend
 from ghest_rt.config.load import LoadedStation, load_station
 from ghest_rt.config.station import StationConfig
 from ghest_rt.errors import BadInputError
@@ -44,7 +45,6 @@ class RunOptions:
         duration_s: Stop after this long; None for ever.
         as_json: The summary as JSON.
         movement: What a simulated patient does.
-        sensor: What a simulated station's cameras are.
         seed: Of the simulation.
     """
 
@@ -55,7 +55,6 @@ class RunOptions:
     duration_s: float | None
     as_json: bool
     movement: Movement
-    sensor: Sensor
     seed: int
 
 
@@ -103,7 +102,8 @@ def _refuse_replay(config: StationConfig, path: Path) -> None:
 
 
 def _world(station: LoadedStation, options: RunOptions, start_ns: int) -> "LiveWorld | None":
-    if not uses_simulation(station.config):
+    device = station.config.cameras["r0"].device
+    if not uses_simulation(station.config) or not isinstance(device, SimBackend):
         return None
     need_simulation()
     from ghest_rt.cli.sim_world import LiveWorld  # noqa: PLC0415  (needs the extra `sim`)
@@ -113,7 +113,7 @@ def _world(station: LoadedStation, options: RunOptions, start_ns: int) -> "LiveW
         SimulateOptions(
             out=Path(),
             movement=options.movement.value,
-            sensor=options.sensor.value,
+            sensor=device.sensor,
             seed=options.seed,
             arm=station.config.station.arm,
             station=options.station,

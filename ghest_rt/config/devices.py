@@ -12,6 +12,7 @@ class SimBackend(Strict):
     """A device of the simulated clinic (needs the extra `sim`)."""
 
     backend: Literal["sim"]
+    sensor: Literal["paper", "sr300"] = Field(default="paper", description="What a live run simulates")
 
 
 class ReplayBackend(Strict):

@@ -6,17 +6,24 @@ from ghest_drivers.clock import Clock
 from ghest_drivers.errors import DriverError
 from ghest_drivers.factory import make_camera, make_encoders
 from ghest_drivers.interfaces import EncoderLink, RgbdCamera
+from ghest_rt.config.devices import SimBackend
 from ghest_rt.config.load import LoadedStation
-from ghest_rt.config.station import StationConfig
-from ghest_rt.errors import DeviceError
+from ghest_rt.config.station import Camera, StationConfig
+from ghest_rt.errors import BadInputError, DeviceError
 from ghest_rt.service.encoder_device import make_encoder_link
-
-SIM = "sim"
 
 
 def uses_simulation(config: StationConfig) -> bool:
-    """Return whether any of the station's devices is simulated."""
-    return SIM in {config.encoders.device.backend, *(camera.device.backend for camera in config.cameras.values())}
+    """Return whether the station's devices are simulated.
+
+    Raises:
+        BadInputError: Some are and some are not.
+    """
+    devices = (config.encoders.device, *(camera.device for camera in config.cameras.values()))
+    simulated = [isinstance(device, SimBackend) for device in devices]
+    if any(simulated) and not all(simulated):
+        raise BadInputError('either all devices of a station are simulated (backend = "sim") or none; correct the backends')
+    return all(simulated)
 
 
 def make_devices(
@@ -30,28 +37,21 @@ def make_devices(
         sim_settings: What simulated devices are made with: `world` and `start_ns`.
 
     Raises:
+        BadInputError: A setting of a device does not fit the others.
         DeviceError: A backend is unknown here, or the library that drives it is missing.
-        BadInputError: The encoders' settings do not fit together, or a file they name cannot be read.
     """
     config = station.config
-
-    def settings(device: object, own: dict[str, object]) -> dict[str, object]:
-        return dict(sim_settings) if device == SIM else own
-
     try:
-        cameras = {
-            name: make_camera(
-                camera.device.backend,
-                name,
-                clock,
-                settings(camera.device.backend, camera.device.model_dump(exclude={"backend"})),
-            )
-            for name, camera in config.cameras.items()
-        }
-        if config.encoders.device.backend == SIM:
-            link = make_encoders(SIM, clock, dict(sim_settings))
-        else:
-            link = make_encoder_link(station, clock)
+        cameras = {name: _camera(name, camera, clock, sim_settings) for name, camera in config.cameras.items()}
+        if isinstance(config.encoders.device, SimBackend):
+            return cameras, make_encoders("sim", clock, sim_settings)
+        return cameras, make_encoder_link(station, clock)
     except DriverError as error:
         raise DeviceError(str(error)) from error
-    return cameras, link
+
+
+def _camera(name: str, camera: Camera, clock: Clock, sim_settings: Mapping[str, object]) -> RgbdCamera:
+    device = camera.device
+    if isinstance(device, SimBackend):
+        return make_camera("sim", name, clock, sim_settings)
+    return make_camera(device.backend, name, clock, device.model_dump(exclude={"backend"}))
