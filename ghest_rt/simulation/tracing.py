@@ -15,7 +15,7 @@ _AMBIENT = 0.82
 
 
 def shade(normals: Array) -> Array:
-    """Return the brightness 0.82-1 of surfaces with (n, 3) normals in E: the soft light of a clinic, a little stronger from above and behind."""
+    """Return the brightness 0.82-1 of surfaces with (n, 3) normals in E: soft light, rather from above and behind."""
     return np.asarray(_AMBIENT + (1.0 - _AMBIENT) * (0.5 + 0.5 * (normals @ _TO_LIGHT)))
 
 
