@@ -1,0 +1,160 @@
+"""The OAK driver: device nodes, a Sync node on the host, and a thread that converts what comes out of it."""
+
+import logging
+import threading
+from datetime import timedelta
+from typing import Any
+
+import numpy as np
+
+from ghest_drivers.clock import Clock
+from ghest_drivers.errors import BadDeviceData, DeviceLost, DeviceNotFound, DriverError
+from ghest_drivers.hardware.cameras.frame_queue import FrameQueue
+from ghest_drivers.hardware.cameras.stats import CameraStats
+from ghest_drivers.hardware.oak.frames import GroupConverter, nanoseconds
+from ghest_drivers.hardware.oak.sdk import dai
+from ghest_drivers.hardware.oak.settings import OakSettings
+from ghest_drivers.hardware.oak.source import DEPTH_UNIT_M, ConnectedOak, Source
+from ghest_drivers.samples import CameraInfo, Intrinsics, RgbdFrame
+
+_log = logging.getLogger(__name__)
+_POLL = timedelta(milliseconds=100)
+_FIRST_FRAME_NS = 10_000_000_000
+
+
+class OakCamera:
+    """An `RgbdCamera` on DepthAI.
+
+    The vendor's code runs in this process: for live use wrap it in a `SupervisedCamera`.
+
+    Args:
+        name: The camera's name in the station file.
+        source: Where images come from.
+        settings: Streams and options.
+        clock: Host clock, of the same kind as CLOCK_MONOTONIC.
+    """
+
+    def __init__(self, name: str, source: Source, settings: OakSettings, clock: Clock) -> None:
+        self._name = name
+        self._source = source
+        self._settings = settings
+        self._clock = clock
+        self._session: _Session | None = None
+        self._lock = threading.Lock()
+        self.stats = CameraStats()
+
+    @property
+    def info(self) -> CameraInfo:
+        """See `RgbdCamera.info`."""
+        return self._opened().info
+
+    def open(self) -> None:
+        """See `RgbdCamera.open`; also raises DriverError where the device lacks what the settings ask for."""
+        with self._lock:
+            if self._session is None:
+                self._session = _Session(self._name, self._source, self._settings, self._clock, self.stats)
+
+    def read(self, timeout_s: float) -> RgbdFrame:
+        """See `RgbdCamera.read`."""
+        return self._opened().queue.get(timeout_s)
+
+    def close(self) -> None:
+        """See `RgbdCamera.close`."""
+        with self._lock:
+            session, self._session = self._session, None
+        if session is not None:
+            session.close()
+            _log.info("camera %s: %s", self._name, self.stats.summary())
+
+    def _opened(self) -> "_Session":
+        session = self._session
+        if session is None:
+            raise DeviceLost(f"camera {self._name} is not open")
+        return session
+
+
+class _Session:
+    """From `open` to `close`. Opening ends with the first frame, which brings the calibration."""
+
+    def __init__(self, name: str, source: Source, settings: OakSettings, clock: Clock, stats: CameraStats) -> None:
+        self._name = name
+        self._source = source
+        self._clock = clock
+        self.queue = FrameQueue(settings.queue_frames, stats)
+        self._closing = threading.Event()
+        self._pump: threading.Thread | None = None
+        self._pipeline: dai.Pipeline | None = None
+        try:
+            images, sync = source.connect(settings)
+            self._pipeline = images.pipeline
+            sync.setRunOnHost(True)
+            sync.setSyncThreshold(timedelta(microseconds=settings.period_ns / 2000))
+            self._groups = sync.out.createOutputQueue(maxSize=settings.queue_frames, blocking=False)
+            self._pipeline.start()
+            size_px = Intrinsics(settings.width_px, settings.height_px, 1.0, 1.0, 0.0, 0.0)
+            unknown = CameraInfo(
+                name, images.model, images.serial, size_px, size_px, DEPTH_UNIT_M, np.eye(4), float(settings.rate_hz)
+            )
+            sdk_clock: Any = dai.Clock
+            host_offset_ns = clock.now_ns() - nanoseconds(sdk_clock.now())
+            self._converter = GroupConverter(unknown, host_offset_ns, stats)
+            self.info = self._first_frame()
+        except RuntimeError as error:
+            self.close()
+            raise DeviceNotFound(f"camera {name} cannot be started: {error}") from error
+        except DriverError:
+            self.close()
+            raise
+        self._pump = threading.Thread(target=self._run, name=f"oak-{name}", daemon=True)
+        self._pump.start()
+
+    def close(self) -> None:
+        """Stop the nodes and let go of the device."""
+        self._closing.set()
+        self.queue.close()
+        if self._pump is not None:
+            self._pump.join()
+        if self._pipeline is not None and self._pipeline.isRunning():
+            self._pipeline.stop()
+        self._pipeline = None
+        self._source.release()
+
+    def _first_frame(self) -> CameraInfo:
+        deadline_ns = self._clock.now_ns() + _FIRST_FRAME_NS
+        while self._clock.now_ns() < deadline_ns:
+            frame = self._next_frame()
+            if frame is not None:
+                self.queue.put(frame)
+                return frame.info
+        raise DeviceLost(f"camera {self._name} was opened, but no pair of images came within {_FIRST_FRAME_NS * 1e-9:.0f} s")
+
+    def _run(self) -> None:
+        while not self._closing.is_set():
+            try:
+                frame = self._next_frame()
+            except BadDeviceData as error:
+                self.queue.put(error)
+            except Exception as error:  # the SDK's own, whatever they are: X_LINK_ERROR above all
+                self.queue.end(DeviceLost(f"camera {self._name}: {error}"))
+                return
+            else:
+                if frame is not None:
+                    self.queue.put(frame)
+
+    def _next_frame(self) -> RgbdFrame | None:
+        """Return the next frame; None if there was none for a while, or it was not usable."""
+        group = self._groups.get(_POLL)
+        if group is None:
+            return None
+        t_arrival_ns = self._clock.now_ns()
+        if not isinstance(group, dai.MessageGroup):
+            raise BadDeviceData(f"camera {self._name}: expected a group of images, got {type(group).__name__}")
+        color, depth = group["color"], group["depth"]
+        if not (isinstance(color, dai.ImgFrame) and isinstance(depth, dai.ImgFrame)):
+            raise BadDeviceData(f"camera {self._name}: expected images, got {type(color).__name__}, {type(depth).__name__}")
+        return self._converter.convert(color, depth, t_arrival_ns)
+
+
+def connected_camera(name: str, mxid: str, settings: OakSettings, clock: Clock) -> OakCamera:
+    """Return the driver of the camera with this id."""
+    return OakCamera(name, ConnectedOak(mxid), settings, clock)
