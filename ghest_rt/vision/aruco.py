@@ -40,13 +40,14 @@ class ArucoDetector:
         """
         check_frame(frame, self._info)
         corners, ids, _ = self._detector.detectMarkers(cv2.cvtColor(frame.color_rgb, cv2.COLOR_RGB2GRAY))
-        found = [] if ids is None else [corners[k] for k in np.flatnonzero(np.ravel(ids) == self._id)]
+        known = [] if ids is None else np.ravel(ids).tolist()
+        found = [quad for quad, marker_id in zip(corners, known, strict=True) if marker_id == self._id]
         status = MarkerStatus.NOT_FOUND
         pose = None
         if len(found) == 1:
             solved, rotvec_rad, position_m = cv2.solvePnP(
                 self._corners_m,
-                found[0].reshape(4, 2),
+                np.asarray(found[0]).reshape(4, 2),
                 self._info.color.matrix,
                 self._distortion,
                 flags=cv2.SOLVEPNP_IPPE_SQUARE,

@@ -1,6 +1,9 @@
 """Refuse images that do not belong to the camera a detector was made for."""
 
+from typing import Any
+
 import numpy as np
+from numpy.typing import NDArray
 
 from ghest_drivers.samples import CameraInfo, RgbdFrame
 from ghest_rt.errors import BadInputError
@@ -12,27 +15,16 @@ def check_frame(frame: RgbdFrame, info: CameraInfo) -> None:
     Raises:
         BadInputError: Size or type differ; names the camera, the frame, what came and what was expected.
     """
-    color = frame.color_rgb
-    wanted = (info.color.height_px, info.color.width_px, 3)
-    if color.shape != wanted or color.dtype != np.uint8:
-        _refuse(frame, info, "colour", color.shape, color.dtype.name, wanted, "uint8")
-    depth = frame.depth_counts
-    if depth is not None:
-        size = (info.depth.height_px, info.depth.width_px)
-        if depth.shape != size or depth.dtype != np.uint16:
-            _refuse(frame, info, "depth", depth.shape, depth.dtype.name, size, "uint16")
+    _check(frame, info, "colour", frame.color_rgb, (info.color.height_px, info.color.width_px, 3), np.dtype(np.uint8))
+    if frame.depth_counts is not None:
+        _check(frame, info, "depth", frame.depth_counts, (info.depth.height_px, info.depth.width_px), np.dtype(np.uint16))
 
 
-def _refuse(
-    frame: RgbdFrame,
-    info: CameraInfo,
-    which: str,
-    got: tuple[int, ...],
-    got_type: str,
-    wanted: tuple[int, ...],
-    wanted_type: str,
+def _check(  # noqa: PLR0917
+    frame: RgbdFrame, info: CameraInfo, which: str, image: NDArray[Any], shape: tuple[int, ...], dtype: np.dtype[Any]
 ) -> None:
-    raise BadInputError(
-        f"camera {info.name}, frame {frame.seq}: the {which} image is {got_type} {got}, but the camera's calibration says "
-        f"{wanted_type} {wanted} (height, width, …); record or configure the calibration of the resolution in use"
-    )
+    if image.shape != shape or image.dtype != dtype:
+        raise BadInputError(
+            f"camera {info.name}, frame {frame.seq}: the {which} image is {image.dtype} {image.shape}, but the camera's "
+            f"calibration says {dtype} {shape} (height, width, …); use the calibration of the resolution in use"
+        )

@@ -23,6 +23,8 @@ _RING_POINTS = 16
 _RING_LIKE = 0.15
 _RING_SHARE = 0.6
 _KEY_STEPS = 6.0
+_WHITE_SAMPLES = 1500
+_BRIGHTER_SHARE = 0.025
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,9 +55,10 @@ class BlobFinder:
 
     def bright_white(self, image: NDArray[np.uint8]) -> tuple[float, float, float]:
         """Return a guess at the light's white: the level that few pixels exceed, channel by channel."""
-        coarse = image[:: 2 * self._step, :: 2 * self._step]
-        ranked = np.partition(coarse.reshape(-1, 3), -(coarse.shape[0] * coarse.shape[1] // 40), axis=0)
-        red, green, blue = ranked[-(coarse.shape[0] * coarse.shape[1] // 40)].tolist()
+        step = max(1, round((image.shape[0] * image.shape[1] / _WHITE_SAMPLES) ** 0.5))
+        channels = image[::step, ::step].reshape(-1, 3).T.copy()
+        rank = channels.shape[1] - 1 - int(_BRIGHTER_SHARE * channels.shape[1])
+        red, green, blue = np.partition(channels, rank, axis=1)[:, rank].tolist()
         return max(red, 1.0), max(green, 1.0), max(blue, 1.0)
 
     def find(self, image: NDArray[np.uint8], white: tuple[float, float, float]) -> Blobs | None:
@@ -82,7 +85,7 @@ class BlobFinder:
         if len(chosen) > _MAX_BLOBS:
             chosen = chosen[np.argsort(area[chosen])[-_MAX_BLOBS:]]
         half = 0.5 * np.stack([width[chosen], height[chosen]], axis=1)
-        centers = centroids[1:][chosen]
+        centers = np.asarray(centroids[1:][chosen], dtype=np.float64)
         relative, white_around = self._relative_colors(coarse, centers, half)
         if not white_around.any():
             return None

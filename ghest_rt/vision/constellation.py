@@ -8,18 +8,20 @@ import itertools
 import math
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 
 from ghest_rt.geometry.so3 import Array
 from ghest_rt.vision.color_blobs import Blobs
+from ghest_rt.vision.disk_centers import Color
 from ghest_rt.vision.layout import PLATE_LEVEL, MarkerLayout
 from ghest_rt.vision.optics import Optics
+from ghest_rt.vision.planar_pose import facing_homography, homography
 
 _COLOR_REACH = 0.24  # distance of chromaticities
 _PER_COLOR = 4
 _SKEW = 0.3  # difference of opposite sides, over the mean side
 _AREA_LOW, _AREA_HIGH = 0.55, 1.7
+_PAIR_LOW, _PAIR_HIGH = 0.65, 1.5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -27,14 +29,17 @@ class Constellation:
     """The marker's disks among the spots.
 
     Attributes:
-        H: (3, 3) homography from the plate (metres) to rays; affine if only three disks were found.
-        relative: (4, 3) colours relative to the plate's; the nominal ones where a disk was not found.
-        found: How many disks were found.
+        H: (3, 3) homography from the plate (metres) to rays; affine if only three disks were found, and of a plate facing the
+            camera squarely if two.
+        seen: Which disks were found.
+        rays: (n, 2) rays through their centres.
+        relative: Colours of p0..p3 relative to the plate's; the nominal ones where a disk was not found.
     """
 
     H: Array
-    relative: Array
-    found: int
+    seen: list[int]
+    rays: Array
+    relative: list[Color]
 
 
 class ConstellationFinder:
@@ -49,7 +54,7 @@ class ConstellationFinder:
         self._area_share = math.pi * layout.radius_m**2 / side_m**2
 
     def find(self, blobs: Blobs) -> Constellation | None:
-        """Return the best choice of four spots, else of three, or None if neither makes a marker."""
+        """Return the best choice of four spots, else of three, else of two, or None if none makes a marker."""
         chroma = blobs.relative / np.maximum(blobs.relative.sum(axis=1, keepdims=True), 1e-6)
         distance = np.linalg.norm(chroma[None] - self._chroma[:, None], axis=2)
         candidates = []
@@ -75,6 +80,14 @@ class ConstellationFinder:
                         if best is None or cost < best[0]:
                             row = iter(picked)
                             best = (cost, tuple(None if k == hidden else next(row) for k in range(4)))
+        if best is None:
+            for one, other in itertools.combinations(range(4), 2):
+                for a, b in itertools.product(candidates[one], candidates[other]):
+                    cost = self._pair_cost(one, other, math.dist(places[a], places[b]), areas[a] * areas[b])
+                    if cost is not None:
+                        cost += float(distance[one, a] + distance[other, b])
+                        if best is None or cost < best[0]:
+                            best = (cost, tuple(a if k == one else b if k == other else None for k in range(4)))
         return None if best is None else self._constellation(best[1], blobs)
 
     def _square_cost(self, points: list[list[float]], areas: list[float]) -> float | None:
@@ -103,6 +116,12 @@ class ConstellationFinder:
         full[hidden] = [full[one][c] + full[other][c] - full[opposite][c] for c in range(2)]
         return self._square_cost(full, areas)
 
+    def _pair_cost(self, one: int, other: int, apart_px: float, areas_product: float) -> float | None:
+        """How far two spots are from the right distance for their size; None if too far, tilts considered."""
+        apart_m = math.dist(self._layout.centers_m[one], self._layout.centers_m[other])
+        ratio = apart_px / apart_m * self._layout.radius_m * math.sqrt(math.pi) / areas_product**0.25
+        return None if not _PAIR_LOW < ratio < _PAIR_HIGH else abs(math.log(ratio))
+
     def _area_cost(self, areas: list[float], square: float, skew: float) -> float | None:
         cost = skew
         for area in areas:
@@ -115,12 +134,9 @@ class ConstellationFinder:
     def _constellation(self, choice: tuple[int | None, ...], blobs: Blobs) -> Constellation:
         seen = [k for k in range(4) if choice[k] is not None]
         picked = [b for b in choice if b is not None]
-        rays = self._optics.disk_rays(blobs.centers_px[picked], 0.0).astype(np.float32)
-        plate_m = self._layout.centers_m[seen].astype(np.float32)
-        if len(seen) == 4:
-            H = np.asarray(cv2.getPerspectiveTransform(plate_m, rays), dtype=np.float64)
-        else:
-            H = np.vstack([cv2.getAffineTransform(plate_m, rays), (0.0, 0.0, 1.0)])
+        rays = self._optics.disk_rays(blobs.centers_px[picked], np.zeros((len(picked), 1)))
+        plate_m = self._layout.centers_m[seen]
+        H = facing_homography(plate_m, rays) if len(seen) == 2 else homography(plate_m, rays)
         relative = self._nominal.copy()
         relative[seen] = blobs.relative[picked]
-        return Constellation(H, relative, len(seen))
+        return Constellation(H, seen, rays, [(red, green, blue) for red, green, blue in relative.tolist()])

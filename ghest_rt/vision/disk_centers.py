@@ -12,12 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ghest_rt.geometry.so3 import Array
 from ghest_rt.vision.ellipses import DiskImage, MarkerImage
 from ghest_rt.vision.layout import PLATE_LEVEL, MarkerLayout
 from ghest_rt.vision.plate_light import PlateLight
 
 Float32 = NDArray[np.float32]
+Color = tuple[float, float, float]
 Places = list[tuple[float, float]]
 
 _FOREIGN2 = 0.3**2  # squared distance from the mixing line, in units of |disk - plate|, beyond which a pixel is foreign
@@ -45,7 +45,7 @@ class DiskCenter:
     v: float
     sigma_px: float
     radius2_px: float
-    relative: tuple[float, float, float]
+    relative: Color
 
 
 DiskCenters = tuple[DiskCenter | None, ...]  # p0..p3, None where the disk is not wholly seen
@@ -55,12 +55,14 @@ class DiskMeter:
     """Measures the four disks at once, by their colours relative to the plate's, which it is told as they become known.
 
     Attributes:
-        relative: (4, 3) the disks' colours, each channel divided by the plate's.
+        relative: The colours of p0..p3, each channel divided by the plate's.
     """
 
     def __init__(self, layout: MarkerLayout) -> None:
         self._centers_m = layout.centers_m.tolist()
-        self._nominal = layout.disk_rgb / PLATE_LEVEL
+        self._nominal = [
+            (red / PLATE_LEVEL, green / PLATE_LEVEL, blue / PLATE_LEVEL) for red, green, blue in layout.disk_rgb.tolist()
+        ]
         self.relative = self._nominal
         self._grids: dict[int, tuple[Float32, Float32]] = {}
 
@@ -114,7 +116,7 @@ class DiskMeter:
         mixed -= mix[:, 3, :, None]
 
         weight = inside.astype(np.float32)[:, None, :]
-        n_inside = np.add.reduce(weight, axis=2)
+        n_inside = np.maximum(np.add.reduce(weight, axis=2), 1.0)
         means = (weight @ mixed.transpose(0, 2, 1))[:, 0] / n_inside
         alpha = mixed[:, 0]
         alpha /= np.maximum(means[:, :1], _INSIDE_RANGE[0])
@@ -123,17 +125,18 @@ class DiskMeter:
         np.subtract(filled, alpha, out=alpha)  # now zero in the band; inside and outside what the image should not hold
         distance2 = np.einsum("kcn,kcn->kn", mixed, mixed)
         foreign = (distance2 > _FOREIGN2) & near
-        n_foreign = np.add.reduce(foreign, axis=1)
-        if n_foreign.any():
+        n_foreign = np.add.reduce(foreign, axis=1).tolist()
+        if any(n_foreign):
             filled[foreign] = quad[foreign] < 1.0
         sums = (filled @ moments).tolist()
+        centered = means.tolist()
         scatter = ((weight @ distance2[:, :, None])[:, 0] / n_inside).tolist()
 
         found: list[DiskCenter | None] = []
         for k, disk in enumerate(predicted.disks):
             area, sum_u, sum_v = sums[k]
             radius2 = math.sqrt(max(disk.determinant, 0.0))
-            a_in, b_in, c_in = means[k].tolist()
+            a_in, b_in, c_in = centered[k]
             covered = n_foreign[k] > max(_MAX_FOREIGN * math.pi * radius2 * (1.0 + band) ** 2, 1.0)
             whole = seen[k] and not covered and _INSIDE_RANGE[0] < a_in < _INSIDE_RANGE[1]
             if not whole or not _AREA_RANGE[0] < area / (math.pi * radius2) < _AREA_RANGE[1]:
@@ -167,13 +170,14 @@ class DiskMeter:
             inverse = 1.0 / (light.level * (1.0 + x_m * light.slope[0] + y_m * light.slope[1]))
             gu, gv = -slope_u * inverse * inverse, -slope_v * inverse * inverse
             bright.append((inverse - gu * u - gv * v, gu, gv))
-        return [_mixing_rows(light.rgb, relative) for relative in self.relative.tolist()], bright
+        return [_mixing_rows(light.rgb, relative) for relative in self.relative], bright
 
 
 def _inside(image: NDArray[np.uint8], place: tuple[float, float], disk: DiskImage, reach: float) -> bool:
     """Whether the ellipse, grown by the factor `reach`, lies wholly in the image."""
     du, dv = reach * math.sqrt(max(disk.a, 0.0)), reach * math.sqrt(max(disk.c, 0.0))
-    return du <= place[0] <= image.shape[1] - 1 - du and dv <= place[1] <= image.shape[0] - 1 - dv
+    height, width = image.shape[:2]
+    return bool(du <= place[0] <= width - 1 - du and dv <= place[1] <= height - 1 - dv)
 
 
 def _quadratic(disk: DiskImage, x: float, y: float) -> tuple[float, float, float, float, float, float]:
@@ -184,7 +188,7 @@ def _quadratic(disk: DiskImage, x: float, y: float) -> tuple[float, float, float
     return (x * au + y * av, -2.0 * au, -2.0 * av, a, 2.0 * b, c)
 
 
-def _mixing_rows(plate: tuple[float, float, float], relative: list[float]) -> list[list[float]]:
+def _mixing_rows(plate: tuple[float, float, float], relative: Color) -> list[list[float]]:
     """Return what turns a colour into alpha and two coordinates across the line from plate to disk colour.
 
     Four rows of three numbers: the factors of red, green and blue, and what to take off; all three coordinates have alpha's
@@ -206,11 +210,14 @@ def _mixing_rows(plate: tuple[float, float, float], relative: list[float]) -> li
     return [[x, a, d], [y, b, e], [z, c, f], [x * p + y * q + z * r, a * p + b * q + c * r, d * p + e * q + f * r]]
 
 
-def _relative(rows: list[list[float]], means: tuple[float, float, float], light: PlateLight) -> tuple[float, float, float]:
+def _relative(rows: list[list[float]], means: tuple[float, float, float], light: PlateLight) -> Color:
     """Return a colour, given by its three mixing coordinates, with each channel divided by the plate's."""
-    norm2 = 1.0 / max(sum(row[0] * row[0] for row in rows[:3]), 1e-12)
-    red, green, blue = (
-        1.0 + norm2 * (row[0] * means[0] + row[1] * means[1] + row[2] * means[2]) / max(share, 1e-6)
-        for row, share in zip(rows, light.rgb, strict=False)
+    (x, a, d), (y, b, e), (z, c, f) = rows[:3]
+    m, n, o = means
+    norm2 = 1.0 / (x * x + y * y + z * z)
+    red, green, blue = light.rgb
+    return (
+        1.0 + norm2 * (x * m + a * n + d * o) / max(red, 1e-6),
+        1.0 + norm2 * (y * m + b * n + e * o) / max(green, 1e-6),
+        1.0 + norm2 * (z * m + c * n + f * o) / max(blue, 1e-6),
     )
-    return red, green, blue

@@ -14,7 +14,7 @@ Method = Literal["paper", "refined", "aruco"]
 
 
 def make_detector(
-    method: Method, camera_name: str, marker_name: str, marker: Marker, info: CameraInfo, color_only: bool = False
+    method: Method, camera_name: str, marker_name: str, marker: Marker, info: CameraInfo, *, color_only: bool = False
 ) -> MarkerDetector:
     """Return a new detector of one marker for one camera.
 

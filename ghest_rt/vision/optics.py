@@ -1,7 +1,6 @@
 """Pixels and rays of one lens, fast for the handful of points a frame needs."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ghest_drivers.samples import Intrinsics
 from ghest_rt.geometry.so3 import Array
@@ -18,8 +17,8 @@ class Optics:
     def __init__(self, intrinsics: Intrinsics) -> None:
         self.width_px = intrinsics.width_px
         self.height_px = intrinsics.height_px
-        self.focal_px = np.array([intrinsics.fx_px, intrinsics.fy_px])
-        self.center_px = np.array([intrinsics.cx_px, intrinsics.cy_px])
+        self.focal_px: Array = np.array([intrinsics.fx_px, intrinsics.fy_px])
+        self.center_px: Array = np.array([intrinsics.cx_px, intrinsics.cy_px])
         self._numbers = (intrinsics.fx_px, intrinsics.fy_px, intrinsics.cx_px, intrinsics.cy_px)
         self.mean_focal_px = float(self.focal_px.mean())
         self._k = intrinsics.distortion
@@ -58,7 +57,7 @@ class Optics:
             fy * (radial + y * y * slope + 6.0 * p1 * y + 2.0 * p2 * x),
         )
 
-    def disk_rays(self, centroids_px: Array, radius2_px: NDArray[np.float64] | float) -> Array:
+    def disk_rays(self, centroids_px: Array, radius2_px: Array) -> Array:
         """Return the rays (n, 2) through the centroids of small disk images (n, 2), as an undistorted image would show them.
 
         A curved lens moves the centroid of a spot otherwise than the point there: to second order by
@@ -66,7 +65,7 @@ class Optics:
 
         Args:
             centroids_px: (n, 2) centroids in the image.
-            radius2_px: Square of the spots' radius (geometric mean of the semi-axes), (n, 1) or scalar; 0 for plain points.
+            radius2_px: Square of the spots' radius (geometric mean of the semi-axes), (n, 1); 0 for plain points.
         """
         if self._maps is None:
             return (centroids_px - self.center_px) / self.focal_px
@@ -77,7 +76,7 @@ class Optics:
         maps = self._maps
         top = maps[v, u] * (1 - fx) + maps[v, u + 1] * fx
         bottom = maps[v + 1, u] * (1 - fx) + maps[v + 1, u + 1] * fx
-        both = top * (1 - fy) + bottom * fy
+        both: Array = top * (1 - fy) + bottom * fy
         return np.asarray(both[:, :2] + radius2_px * both[:, 2:], dtype=np.float64)
 
 

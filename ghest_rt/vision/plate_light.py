@@ -42,7 +42,6 @@ class PlateSampler:
         """Return the light on the plate that homography H (3, 3) puts into the image; None where no plate is to be seen."""
         points = H @ self._points
         pixels = np.rint(self._optics.pixels((points[:2] / points[2]).T)).astype(np.intp)
-        u, v = pixels[:, 0], pixels[:, 1]
         design, solve = self._design, self._solve
         (u_low, v_low), (u_high, v_high) = pixels.min(axis=0).tolist(), pixels.max(axis=0).tolist()
         if u_low < 0 or v_low < 0 or u_high >= self._optics.width_px or v_high >= self._optics.height_px:

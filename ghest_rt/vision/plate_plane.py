@@ -16,6 +16,7 @@ from ghest_rt.geometry.so3 import Array
 from ghest_rt.vision.layout import MarkerLayout
 from ghest_rt.vision.optics import Optics
 from ghest_rt.vision.registration import ray_grid
+from ghest_rt.vision.small import inverse_of
 
 _MIN_PIXELS = 40
 _MIN_SHARE = 0.3  # of the plate's pixels that must be measured and lie on the plane
@@ -27,6 +28,9 @@ _FLOOR_COUNTS = 1.5  # no pixel is an outlier for being this near
 _MAX_SAMPLES = 3600
 _MIXED_PX = 1.2  # pixels along the plate's edge that may see past it
 _SHIFT_BITS = 4
+_GRAZING = 0.05  # sine of the least angle between plate and line of sight
+
+Float32 = NDArray[np.float32]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -81,48 +85,78 @@ class PlateDepth:
         usable = mask & (counts > 0)
         wanted = max(int(np.count_nonzero(mask)), 1)
 
-        n = depth_from_marker[:3, 2]
-        theta = n / float(n @ depth_from_marker[:3, 3])
-        slope = 1.0 / float(depth_from_marker[2, 3]) ** 2  # inverse metres per metre of depth
+        n, p_m = depth_from_marker[:3, 2], depth_from_marker[:3, 3]
+        distance_m, depth_m = float(n @ p_m), float(p_m[2])
+        if abs(distance_m) < _GRAZING * depth_m:
+            return None
+        slope = 1.0 / (depth_m * depth_m)  # inverse metres per metre of depth
+        theta = n / distance_m
         inverse = np.float32(1.0 / self._unit_m) / np.maximum(counts, 1).astype(np.float32)
         residual = inverse - theta.astype(np.float32) @ basis
-        gates = [gate_m * slope for gate_m in gates_m]
-        for step in range(len(gates) + _MORE_FITS):
-            gate = gates[step] if step < len(gates) else by_scatter
-            used = (np.abs(residual) < gate) & usable
-            count = int(np.count_nonzero(used))
-            if count < max(_MIN_PIXELS, _MIN_SHARE * wanted):
-                return None
-            weighted = basis * used
-            inverse_normal = np.linalg.inv((weighted @ basis.T).astype(np.float64))
-            gradient = (weighted @ residual).astype(np.float64)
-            change = inverse_normal @ gradient
-            theta = theta + change
-            residual -= change.astype(np.float32) @ basis
-            inner = residual * used
-            variance = float(inner @ inner) / (count - 3)
-            by_scatter = max(_SIGMAS * math.sqrt(variance), _FLOOR_COUNTS * self._unit_m * slope)
-            if step + 1 >= len(gates) and np.count_nonzero(np.abs(inner) > by_scatter) <= _FEW * count:
-                break
-        variance = max(variance, (_ROUNDING * self._unit_m * slope) ** 2)
-        return Plane(theta, inverse_normal * variance, count / wanted)
+        least = max(_MIN_PIXELS, round(_MIN_SHARE * wanted))
+        floor = _FLOOR_COUNTS * self._unit_m * slope
+        fitted = _fit_correction(basis, residual, usable, [gate_m * slope for gate_m in gates_m], floor, least=least)
+        if fitted is None:
+            return None
+        covariance = fitted.inverse_normal * max(fitted.variance, (_ROUNDING * self._unit_m * slope) ** 2)
+        return Plane(theta + fitted.change, covariance, fitted.count / wanted)
 
     def _region(self, pose: Array) -> tuple[slice, slice, NDArray[np.bool_]] | None:
         """Return the rows and columns (strided) that hold the plate, and which of their pixels lie well on it."""
         distance_m = float(pose[2, 3])
+        if distance_m <= 0.0:
+            return None
         pixel_m = distance_m / self._optics.mean_focal_px
         inner_m = self._half_m - min(_MIXED_PX * pixel_m + 0.02 * self._half_m, 0.4 * self._half_m)
-        points_m = (inner_m * self._corners) @ pose[:3, :2].T + pose[:3, 3]
-        if points_m[:, 2].min() <= 0.2 * distance_m or distance_m <= 0.0:
-            return None
-        corners_px = self._optics.pixels(points_m[:, :2] / points_m[:, 2:])
-        low = np.maximum(np.ceil(corners_px.min(axis=0)), 0).astype(int)
-        high = np.minimum(np.floor(corners_px.max(axis=0)) + 1, (self._optics.width_px, self._optics.height_px)).astype(int)
-        width, height = (high - low).tolist()
+        corners_px = []
+        for x, y, z in ((inner_m * self._corners) @ pose[:3, :2].T + pose[:3, 3]).tolist():
+            if z <= 0.2 * distance_m:
+                return None
+            corners_px.append(self._optics.place(x / z, y / z)[:2])
+        columns, rows = zip(*corners_px, strict=True)
+        left, right = max(math.ceil(min(columns)), 0), min(math.floor(max(columns)) + 1, self._optics.width_px)
+        top, bottom = max(math.ceil(min(rows)), 0), min(math.floor(max(rows)) + 1, self._optics.height_px)
+        width, height = right - left, bottom - top
         if width < 5 or height < 5:
             return None
         step = max(1, round((width * height / _MAX_SAMPLES) ** 0.5))
         mask = np.zeros((-(-height // step), -(-width // step)), dtype=np.uint8)
-        polygon = np.rint((corners_px - low) * ((1 << _SHIFT_BITS) / step)).astype(np.int32)
+        scale = (1 << _SHIFT_BITS) / step
+        polygon = np.array([(round((u - left) * scale), round((v - top) * scale)) for u, v in corners_px], dtype=np.int32)
         cv2.fillConvexPoly(mask, polygon, 1, lineType=cv2.LINE_8, shift=_SHIFT_BITS)
-        return slice(low[1], high[1], step), slice(low[0], high[0], step), mask.view(np.bool_).ravel()
+        return slice(top, bottom, step), slice(left, right, step), mask.view(np.bool_).ravel()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Correction:
+    change: Array  # (3,) to be added to theta
+    inverse_normal: Array  # (3, 3)
+    variance: float  # of one pixel's inverse depth
+    count: int  # pixels that took part
+
+
+def _fit_correction(
+    basis: Float32, residual: Float32, usable: NDArray[np.bool_], gates: list[float], floor: float, *, least: int
+) -> _Correction | None:
+    """Fit change . (x, y, 1) to the residuals (n,) of inverse depth, outliers left out; None if too few pixels stay."""
+    change = np.zeros(3)
+    for step in range(len(gates) + _MORE_FITS):
+        used = (np.abs(residual) < gates[step]) & usable
+        count = int(np.count_nonzero(used))
+        if count < least:
+            return None
+        weighted = basis * used
+        inverted = inverse_of((weighted @ basis.T).astype(np.float64))
+        if inverted is None:
+            return None
+        inverse_normal = inverted
+        more = inverse_normal @ (weighted @ residual).astype(np.float64)
+        change += more
+        residual = residual - more.astype(np.float32) @ basis
+        inner = residual * used
+        variance = float(inner @ inner) / (count - 3)
+        if step + 1 >= len(gates):
+            gates.append(max(_SIGMAS * math.sqrt(variance), floor))
+            if np.count_nonzero(np.abs(inner) > gates[-1]) <= _FEW * count:
+                break
+    return _Correction(change, inverse_normal, variance, count)

@@ -1,12 +1,15 @@
 """The pose that explains the disk centres and the plate's plane best: Gauss-Newton on both with their covariances."""
 
+import math
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 
 from ghest_rt.geometry.so3 import Array, exp_so3
 from ghest_rt.vision.ellipses import ellipse
 from ghest_rt.vision.plate_plane import Plane
+from ghest_rt.vision.small import inverse_of
 
 _SMALL_STEP = 1e-3  # rad, and of the distance: the next Gauss-Newton step would be about the square of this
 
@@ -38,7 +41,9 @@ class PoseFit:
         information: (6, 6) of (rotation error rad, translation error m) in camera axes.
         center_chi2: Squared deviations of the centres over their variances, summed.
         plane_chi2: The same of the plane; 0 without one.
+        plane_off: Relative change of theta that the pose asks of the plane; 0 without one.
         deviations: (n,) distance of each centre from where the pose puts it, in ray units.
+        sigma: (n,) what of that noise explains, one standard deviation per coordinate.
     """
 
     R: Array
@@ -46,7 +51,19 @@ class PoseFit:
     information: Array
     center_chi2: float
     plane_chi2: float
+    plane_off: float
     deviations: Array
+    sigma: Array
+
+    @property
+    def chi2(self) -> float:
+        """Squared deviations over their variances, all together."""
+        return self.center_chi2 + self.plane_chi2
+
+    @property
+    def faces_camera(self) -> bool:
+        """Whether the plate shows the camera its front."""
+        return float(self.R[:, 2] @ self.p_m) < 0.0
 
 
 def fit_pose(R: Array, p_m: Array, centers: Centers, plane: Plane | None, max_steps: int) -> PoseFit | None:
@@ -66,7 +83,9 @@ def fit_pose(R: Array, p_m: Array, centers: Centers, plane: Plane | None, max_st
         The fit, or None if it is singular or leaves the space before the camera.
     """
     weights = np.repeat(1.0 / centers.sigma, 2)
-    plane_information = None if plane is None else np.linalg.inv(plane.covariance)
+    plane_information = np.zeros((3, 3)) if plane is None else inverse_of(plane.covariance)
+    if plane_information is None:
+        return None
     places = centers.plate_m.tolist()
     seen = centers.rays.ravel()
     for step in range(max_steps):
@@ -83,27 +102,25 @@ def fit_pose(R: Array, p_m: Array, centers: Centers, plane: Plane | None, max_st
             weighted = plane_information @ J_plane
             information += J_plane.T @ weighted
             gradient += off @ weighted
-        try:
-            change = np.linalg.solve(information, gradient)
-        except np.linalg.LinAlgError:
+        solved, column = cv2.solve(information, gradient, flags=cv2.DECOMP_CHOLESKY)
+        change = np.asarray(column, dtype=np.float64).ravel()
+        x, y, z, dx, dy, dz = change.tolist()
+        size = max(abs(x), abs(y), abs(z), max(abs(dx), abs(dy), abs(dz)) / abs(float(p_m[2])))
+        if not solved or not size < 1.0:
             return None
-        turn, shift = change[:3], change[3:]
-        size = max(float(np.abs(turn).max()), float(np.abs(shift).max()) / abs(float(p_m[2])))
-        if not size < 1.0:
-            return None
-        R = exp_so3(turn) @ R
-        p_m = p_m + shift
+        R = exp_so3(change[:3]) @ R
+        p_m = p_m + change[3:]
         if size < _SMALL_STEP or step + 1 == max_steps:
             break
     # What is left is linear in so small a last step.
     residual -= J @ change
+    plane_chi2 = plane_off = 0.0
     if plane is not None:
         off -= J_plane @ change
+        plane_off = math.sqrt(float(off @ off) / float(plane.theta @ plane.theta))
         plane_chi2 = float(off @ plane_information @ off)
-    else:
-        plane_chi2 = 0.0
     deviations = np.hypot(residual[::2], residual[1::2]) * centers.sigma
-    return PoseFit(R, p_m, information, float(residual @ residual), plane_chi2, deviations)
+    return PoseFit(R, p_m, information, float(residual @ residual), plane_chi2, plane_off, deviations, centers.sigma)
 
 
 def _plane_terms(R: Array, p_m: Array, plane: Plane) -> tuple[Array, Array]:

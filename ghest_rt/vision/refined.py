@@ -1,6 +1,5 @@
 """Method `refined`: sub-pixel disks and the depth plane fused into one pose with its covariance (docs/vision.md)."""
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,15 +10,16 @@ from ghest_rt.geometry.so3 import Array
 from ghest_rt.messages.results import MarkerObservation, MarkerStatus
 from ghest_rt.vision.checks import check_frame
 from ghest_rt.vision.color_blobs import BlobFinder
-from ghest_rt.vision.constellation import ConstellationFinder
-from ghest_rt.vision.disk_centers import DiskCenters, DiskMeter
+from ghest_rt.vision.constellation import Constellation, ConstellationFinder
+from ghest_rt.vision.disk_centers import Color, DiskCenters, DiskMeter
 from ghest_rt.vision.ellipses import marker_image
 from ghest_rt.vision.layout import MarkerLayout
 from ghest_rt.vision.motion import MotionTrack
 from ghest_rt.vision.optics import Optics
-from ghest_rt.vision.planar_pose import Pose, poses_of_homography
+from ghest_rt.vision.planar_pose import Pose, homography, pose_on_plane, poses_of_homography
 from ghest_rt.vision.plate_light import PlateLight, PlateSampler
 from ghest_rt.vision.plate_plane import Plane, PlateDepth
+from ghest_rt.vision.small import inverse_of
 from ghest_rt.vision.solve import Solution, Solver
 
 _BAND_PX = 2.0
@@ -63,7 +63,7 @@ class RefinedDetector:
         self._constellations = ConstellationFinder(self._layout, self._optics)
         self._solver = Solver(self._layout, self._optics)
         self._motion = MotionTrack()
-        self._white: tuple[float, float, float] | None = None
+        self._white: Color | None = None
         self._light: PlateLight | None = None
         self._depth_from_color = inverse(info.color_from_depth)
         self._same_place = bool(np.abs(info.color_from_depth - np.eye(4)).max() < 1e-12)
@@ -98,7 +98,7 @@ class RefinedDetector:
         pose = covariance = None
         if fit is not None:
             pose = transform(fit.R, fit.p_m)
-            covariance = np.linalg.inv(fit.information)
+            covariance = inverse_of(fit.information)
             self._motion.update(frame.t_capture_ns, pose)
         return MarkerObservation(
             camera=self._camera,
@@ -134,7 +134,7 @@ class RefinedDetector:
             constellation = None if blobs is None else self._constellations.find(blobs)
             if constellation is not None:
                 self._meter.relative = constellation.relative
-                solution = self._cold(frame, constellation.H, constellation.found)
+                solution = self._cold(frame, constellation)
                 if solution.fit is not None:
                     return solution
                 best = solution
@@ -143,24 +143,35 @@ class RefinedDetector:
         self._white = None
         return best
 
-    def _cold(self, frame: RgbdFrame, H: Array, found: int) -> Solution:
+    def _cold(self, frame: RgbdFrame, constellation: Constellation) -> Solution:
         """Solve from a rough homography of the plate."""
-        measured = self._look(frame.color_rgb, H, _COLD_BAND_PX)
+        if len(constellation.seen) == 2:
+            return self._cold_pair(frame, constellation)
+        measured = self._look(frame.color_rgb, constellation.H, _COLD_BAND_PX)
         if isinstance(measured, MarkerStatus):
             return Solution(measured)
         centers = self._solver.centers(measured)
         if len(centers.sigma) < 3:
             return Solution(MarkerStatus.TOO_FEW_DISKS, disks=len(centers.sigma))
-        starts = poses_of_homography(_homography(centers.plate_m, centers.rays))
+        starts = poses_of_homography(homography(centers.plate_m, centers.rays))
         if starts is None:
             return Solution(MarkerStatus.BAD_FIT, disks=len(centers.sigma))
         solution = self._solver.cold(centers, self._cold_plane(frame, starts), starts)
-        if solution.fit is not None and found < 4:
+        if solution.fit is not None and len(constellation.seen) == 3:
             # The homography was only affine: look again from the pose, also for the disk that was missing.
             solution = self._track(frame, transform(solution.fit.R, solution.fit.p_m))
         elif solution.fit is not None:
             self._learn(measured)
         return solution
+
+    def _cold_pair(self, frame: RgbdFrame, constellation: Constellation) -> Solution:
+        """Solve from two disks on the plane that depth shows around them."""
+        starts = poses_of_homography(constellation.H)
+        plane = None if starts is None else self._cold_plane(frame, starts)
+        if plane is None:
+            return Solution(MarkerStatus.TOO_FEW_DISKS, disks=2)
+        pose = pose_on_plane(plane.theta, self._layout.centers_m[constellation.seen], constellation.rays)
+        return Solution(MarkerStatus.BAD_FIT, disks=2) if pose is None else self._track(frame, pose)
 
     def _look(self, image: NDArray[np.uint8], H: Array, band_px: float) -> DiskCenters | MarkerStatus:
         """Measure the disks that a homography predicts, again where they turn out to be off."""
@@ -215,18 +226,14 @@ class RefinedDetector:
 
     def _learn(self, measured: DiskCenters) -> None:
         """Let the remembered colours of disks and light follow what was seen."""
-        relative = self._meter.relative.copy()
-        for k, disk in enumerate(measured):
-            if disk is not None:
-                relative[k] += _LEARN * (np.array(disk.relative) - relative[k])
-        self._meter.relative = relative
+        self._meter.relative = [
+            before if disk is None else _blend(before, disk.relative)
+            for before, disk in zip(self._meter.relative, measured, strict=True)
+        ]
         if self._light is not None:
             self._white = self._light.rgb
 
 
-def _homography(plate_m: Array, rays: Array) -> Array:
-    """Return the homography (3, 3) through four points, or the affine one through three."""
-    if len(plate_m) == 4:
-        H = cv2.getPerspectiveTransform(plate_m.astype(np.float32), rays.astype(np.float32))
-        return np.asarray(H, dtype=np.float64)
-    return np.vstack([cv2.getAffineTransform(plate_m.astype(np.float32), rays.astype(np.float32)), (0.0, 0.0, 1.0)])
+def _blend(before: Color, now: Color) -> Color:
+    r, g, b = before
+    return r + _LEARN * (now[0] - r), g + _LEARN * (now[1] - g), b + _LEARN * (now[2] - b)

@@ -8,20 +8,21 @@ from ghest_drivers.samples import CameraInfo, Intrinsics
 from ghest_rt.geometry.so3 import Array
 
 Depth = NDArray[np.uint16]
+_SAME_PX = 0.05
 
 
 def is_registered(info: CameraInfo) -> bool:
     """Whether depth is measured along the colour camera's rays: the same optical centre, axes and (scaled) intrinsics."""
     color, depth = info.color, info.depth
-    scale = np.array([depth.width_px / color.width_px, depth.height_px / color.height_px] * 2)
-    wanted = scale * (np.array([color.fx_px, color.fy_px, color.cx_px, color.cy_px]) + (0.0, 0.0, 0.5, 0.5)) - (
-        0.0,
-        0.0,
-        0.5,
-        0.5,
+    # Pixel edges, not centres, scale with the resolution: hence the halves.
+    ratio_u, ratio_v = depth.width_px / color.width_px, depth.height_px / color.height_px
+    off_px = (
+        depth.fx_px - ratio_u * color.fx_px,
+        depth.fy_px - ratio_v * color.fy_px,
+        depth.cx_px + 0.5 - ratio_u * (color.cx_px + 0.5),
+        depth.cy_px + 0.5 - ratio_v * (color.cy_px + 0.5),
     )
-    got = np.array([depth.fx_px, depth.fy_px, depth.cx_px, depth.cy_px])
-    same_rays = bool(np.abs(got - wanted).max() < 0.05) and color.distortion == depth.distortion
+    same_rays = bool(np.abs(off_px).max() < _SAME_PX) and color.distortion == depth.distortion
     return same_rays and bool(np.abs(info.color_from_depth - np.eye(4)).max() < 1e-9)
 
 

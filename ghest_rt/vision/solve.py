@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,9 +19,11 @@ _COLD_STEPS = 8
 _SIGMA_FLOOR_PX = 0.006  # pixel aliasing of an anti-aliased disk of a few pixels' radius
 _SIGMA_FACTOR = 1.3  # edges are noisier than interiors: colour and brightness model errors add there
 _MAX_DEVIATION_PX = 0.35
-_MAX_DEVIATION_SIGMAS = 12.0
-_MAX_PLANE_CHI2 = 60.0
-_MAX_PLANE_SCALE = 0.01  # disagreement of the plane with the colour pose, as a share of the distance, that is noise
+_MAX_DEVIATION_SIGMAS = 5.0
+_MAX_PLANE_OFF = 0.03  # change of theta, relative, that the fit may ask of the plane: a scale error of depth, not another plane
+_TIGHT = 8.0  # squared deviations per degree of freedom above which something may be wrong
+_EXPECTED = 3.0  # squared deviations per degree of freedom that noise explains
+_CLEARLY = 6.0  # how much better a fit must be for a disk to be left out
 _SAME_POSE_RAD = 0.06
 _TELL_APART_CHI2 = 16.0
 _RANGE_M = (0.03, 2.0)
@@ -83,28 +85,24 @@ class Solver:
     def _with_plane(
         self, centers: Centers, plane: Plane, fit: PoseFit | None, color_only: Callable[[Centers], Solution]
     ) -> Solution:
-        """Judge a fit with depth; drop the disk or the plane that contradicts the rest."""
-        disks = len(centers.sigma)
-        if fit is not None and fit.plane_chi2 < _MAX_PLANE_CHI2 and self._plausible(fit, centers):
-            return self._checked(fit, MarkerStatus.OK, disks)
-        if disks < 4:
-            return Solution(MarkerStatus.BAD_FIT, disks=disks)
-        colored = color_only(centers)
-        if colored.fit is not None:
-            R, p_m = colored.fit.R, colored.fit.p_m
-            off = abs(float(plane.theta @ p_m) - 1.0)
-            tilt = float(np.linalg.norm(np.cross(R[:, 2], plane.theta)) / np.linalg.norm(plane.theta))
-            if fit is None or off > _MAX_PLANE_SCALE or tilt > _SAME_POSE_RAD or fit.plane_chi2 > _MAX_PLANE_CHI2:
-                return colored
-            return self._checked(fit, MarkerStatus.OK, disks)
-        if fit is None:
-            return colored
-        keep = np.arange(disks) != int(fit.deviations.argmax())
-        three = Centers(centers.plate_m[keep], centers.rays[keep], centers.sigma[keep], centers.radius_m)
-        fit = fit_pose(fit.R, fit.p_m, three, plane, _COLD_STEPS)
-        if fit is None or not self._plausible(fit, three) or fit.plane_chi2 > _MAX_PLANE_CHI2:
-            return Solution(MarkerStatus.BAD_FIT, disks=disks)
-        return self._checked(fit, MarkerStatus.OK, disks - 1)
+        """Judge a fit with depth; leave out the disk or the plane that contradicts the rest."""
+        disks = used = len(centers.sigma)
+        if fit is not None and disks == 4 and fit.chi2 > _TIGHT * _freedom(disks):
+            dropped = self._without_one(centers, plane, fit)
+            if dropped is not None and dropped.chi2 / _freedom(3) < fit.chi2 / _freedom(4) / _CLEARLY:
+                fit, used = dropped, 3
+        if fit is not None and fit.plane_off < _MAX_PLANE_OFF and self._plausible(fit):
+            return self._checked(_widened(fit, used), MarkerStatus.OK, used)
+        return color_only(centers) if disks == 4 else Solution(MarkerStatus.BAD_FIT, disks=disks)
+
+    def _without_one(self, centers: Centers, plane: Plane, fit: PoseFit) -> PoseFit | None:
+        """Return the best fit of three of four disks: one may be covered by something of the plate's colour."""
+        fits = []
+        for dropped in range(4):
+            keep = np.arange(4) != dropped
+            three = Centers(centers.plate_m[keep], centers.rays[keep], centers.sigma[keep], centers.radius_m)
+            fits.append(fit_pose(fit.R, fit.p_m, three, plane, _COLD_STEPS))
+        return min((found for found in fits if found is not None), key=lambda found: found.chi2, default=None)
 
     def _color_tracked(self, centers: Centers, start: Pose) -> Solution:
         """Solve without depth from a prediction; the mirrored pose takes over only if it is plainly better."""
@@ -116,7 +114,7 @@ class Solver:
             other = fit_pose(mirrored(fit.R, fit.p_m), fit.p_m, centers, None, _COLD_STEPS)
             if other is not None and other.center_chi2 + _TELL_APART_CHI2 < fit.center_chi2:
                 fit = other
-        if fit is None or not self._plausible(fit, centers):
+        if fit is None or not self._plausible(fit):
             return Solution(MarkerStatus.BAD_FIT, disks=disks)
         return self._checked(fit, MarkerStatus.COLOR_ONLY, disks)
 
@@ -125,7 +123,7 @@ class Solver:
         disks = len(centers.sigma)
         fits = [fit_pose(*start, centers, None, _COLD_STEPS) for start in starts]
         sound = sorted((fit for fit in fits if fit is not None and fit.R[2, 2] < 0.0), key=lambda fit: fit.center_chi2)
-        if not sound or not self._plausible(sound[0], centers):
+        if not sound or not self._plausible(sound[0]):
             return Solution(MarkerStatus.BAD_FIT, disks=disks)
         if len(sound) == 2:
             apart = float(np.linalg.norm(sound[0].R - sound[1].R)) / 2**0.5
@@ -133,11 +131,22 @@ class Solver:
                 return Solution(MarkerStatus.AMBIGUOUS, disks=disks)
         return self._checked(sound[0], MarkerStatus.COLOR_ONLY, disks)
 
-    def _plausible(self, fit: PoseFit, centers: Centers) -> bool:
-        limit = np.maximum(_MAX_DEVIATION_PX / self._optics.mean_focal_px, _MAX_DEVIATION_SIGMAS * centers.sigma)
-        return bool((fit.deviations < limit).all()) and float(fit.R[:, 2] @ fit.p_m) < 0.0
+    def _plausible(self, fit: PoseFit) -> bool:
+        limit = _MAX_DEVIATION_PX / self._optics.mean_focal_px
+        return bool((np.maximum(fit.deviations - _MAX_DEVIATION_SIGMAS * fit.sigma, 0.0) < limit).all()) and fit.faces_camera
 
     def _checked(self, fit: PoseFit, status: MarkerStatus, disks: int) -> Solution:
         if not _RANGE_M[0] <= float(fit.p_m[2]) <= _RANGE_M[1]:
             return Solution(MarkerStatus.OUT_OF_RANGE, disks=disks)
         return Solution(status, fit, disks)
+
+
+def _freedom(disks: int) -> int:
+    """Degrees of freedom of a fit of so many disks and a plane."""
+    return 2 * disks + 3 - 6
+
+
+def _widened(fit: PoseFit, disks: int) -> PoseFit:
+    """Return the fit with a covariance that admits the misfit found: colour and depth seldom agree to their noise."""
+    excess = fit.chi2 / (_EXPECTED * max(_freedom(disks), 1))
+    return fit if excess <= 1.0 else replace(fit, information=fit.information / excess)
