@@ -31,6 +31,9 @@ class Backend:
 
 CAMERAS: dict[str, Backend] = {
     "sim": Backend("ghest_drivers.sim", "SimCamera", "sim"),
+    "realsense": Backend("ghest_drivers.hardware.camera_backends", "realsense", "realsense"),
+    "realsense_bag": Backend("ghest_drivers.hardware.camera_backends", "realsense_bag", "realsense"),
+    "oak": Backend("ghest_drivers.hardware.camera_backends", "oak", "oak"),
 }
 ENCODERS: dict[str, Backend] = {
     "sim": Backend("ghest_drivers.sim", "SimEncoders", "sim"),

@@ -4,6 +4,7 @@ from typing import Literal
 
 from pydantic import Field
 
+from ghest_rt.config.camera_devices import HardwareCameraBackend
 from ghest_rt.config.encoder_devices import HardwareEncoderBackend
 from ghest_rt.config.strict import Strict
 
@@ -21,18 +22,5 @@ class ReplayBackend(Strict):
     backend: Literal["replay"]
 
 
-class RealsenseBackend(Strict):
-    """A RealSense camera (needs the extra `realsense`)."""
-
-    backend: Literal["realsense"]
-    serial: str = Field(description="Serial number as printed by `ghest-rt doctor`")
-    width_px: int = 640
-    height_px: int = 480
-    rate_hz: Literal[30, 60] = 60
-    auto_exposure: bool = False
-    exposure_us: int | None = Field(default=8000, ge=20, le=33000)
-    laser_power: int | None = Field(default=None, ge=0, le=16)
-
-
-CameraBackend = SimBackend | ReplayBackend | RealsenseBackend
+CameraBackend = SimBackend | ReplayBackend | HardwareCameraBackend
 EncoderBackend = SimBackend | ReplayBackend | HardwareEncoderBackend
