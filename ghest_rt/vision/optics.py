@@ -71,8 +71,9 @@ class Optics:
             return (centroids_px - self.center_px) / self.focal_px
         low = np.floor(centroids_px).astype(np.intp)
         np.clip(low, 0, (self.width_px - 2, self.height_px - 2), out=low)
-        fx, fy = (centroids_px - low).T[:, :, None]
-        u, v = low.T
+        part = centroids_px - low
+        fx, fy = part[:, :1], part[:, 1:]
+        u, v = low[:, 0], low[:, 1]
         maps = self._maps
         top = maps[v, u] * (1 - fx) + maps[v, u + 1] * fx
         bottom = maps[v + 1, u] * (1 - fx) + maps[v + 1, u + 1] * fx
