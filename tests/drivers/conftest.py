@@ -12,6 +12,7 @@ from ghest_drivers.interfaces import EncoderLink, RgbdCamera
 from ghest_drivers.replay import ReplayPlayer
 from ghest_drivers.samples import CameraInfo, EncoderInfo, EncoderSample, Intrinsics, RgbdFrame
 from ghest_drivers.sim import SimCamera, SimEncoders
+from tests.hardware_cameras.contract_cases import installed, oak_camera, realsense_camera, supervised_camera
 from tests.hardware_encoders.contract_cases import armeo_encoders, can_encoders, canopen_encoders, serial_encoders
 
 SAMPLES = 8
@@ -117,7 +118,12 @@ async def sim_encoders(silent: bool) -> AsyncIterator[EncoderLink]:
 CAMERA_CASES = {
     "replay": CameraCase(replay_camera, ends=True),
     "sim": CameraCase(sim_camera, ends=True),
+    "supervised": CameraCase(supervised_camera, ends=True),
 }
+if installed("pyrealsense2"):
+    CAMERA_CASES["realsense"] = CameraCase(realsense_camera, ends=False)
+if installed("depthai"):
+    CAMERA_CASES["oak"] = CameraCase(oak_camera, ends=False)
 ENCODER_CASES = {
     "replay": EncoderCase(replay_encoders, ends=True),
     "sim": EncoderCase(sim_encoders, ends=True),

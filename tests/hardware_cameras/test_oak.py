@@ -17,67 +17,11 @@ from ghest_drivers.hardware.cameras.stats import CameraStats
 from ghest_drivers.hardware.oak.camera import OakCamera, connected_camera
 from ghest_drivers.hardware.oak.frames import GroupConverter, intrinsics_of, nanoseconds
 from ghest_drivers.hardware.oak.sdk import dai
-from ghest_drivers.hardware.oak.settings import OakSettings
 from ghest_drivers.hardware.oak.sockets import choose_sockets
-from ghest_drivers.hardware.oak.source import Images
 from ghest_drivers.samples import CameraInfo, Intrinsics
+from tests.hardware_cameras.oak_rig import HEIGHT, MATRIX, PERIOD, SETTINGS, WIDTH, HostSource, color_of, depth_of, image
 
 _LONG_S = 20.0
-_W, _H = 64, 48
-SETTINGS = OakSettings(width_px=_W, height_px=_H, rate_hz=60, queue_frames=16)
-_PERIOD = timedelta(microseconds=16_667)
-_K = [[60.0, 0.0, 31.5], [0.0, 61.0, 23.5], [0.0, 0.0, 1.0]]
-
-
-def image(pixels: Any, number: int, t: timedelta, distortion: list[float] | None = None) -> Any:
-    """A colour or depth message as a device would send it; its clock started 5 s after the host's."""
-    out = dai.ImgFrame()
-    out.setType(dai.ImgFrame.Type.RGB888i if pixels.ndim == 3 else dai.ImgFrame.Type.RAW16)
-    out.setWidth(pixels.shape[1])
-    out.setHeight(pixels.shape[0])
-    out.setData(np.ascontiguousarray(pixels).view(np.uint8).ravel())
-    out.setSequenceNum(number)
-    out.setTimestamp(t)
-    out.setTimestampDevice(t - timedelta(seconds=5))
-    out.setTransformation(
-        dai.ImgTransformation(pixels.shape[1], pixels.shape[0], _K, dai.CameraModel.Perspective, distortion or [0.0] * 14)
-    )
-    return out
-
-
-def color_of(k: int) -> Any:
-    rows = np.arange(_H, dtype=np.uint8)[:, None, None]
-    return np.broadcast_to(rows + np.array([k, 2, 3], np.uint8), (_H, _W, 3)).astype(np.uint8)
-
-
-def depth_of(k: int) -> Any:
-    return (1000 * k + np.arange(_H * _W)).astype(np.uint16).reshape(_H, _W)
-
-
-class HostSource:
-    """In place of a device: queues into the same Sync node."""
-
-    def __init__(self) -> None:
-        self.released = 0
-
-    def connect(self, settings: OakSettings) -> tuple[Images, Any]:
-        pipeline = dai.Pipeline(createImplicitDevice=False)
-        sync = pipeline.create(dai.node.Sync)
-        self.color = sync.inputs["color"].createInputQueue()
-        self.depth = sync.inputs["depth"].createInputQueue()
-        self.started = dai.Clock.now()
-        self.send(0)
-        return Images(pipeline, "OAK-D-SR", "1844"), sync
-
-    def send(self, k: int, *, skew: timedelta = timedelta(), streams: str = "cd") -> None:
-        t = self.started + k * _PERIOD - timedelta(milliseconds=100)
-        if "c" in streams:
-            self.color.send(image(color_of(k), 500 + k, t))
-        if "d" in streams:
-            self.depth.send(image(depth_of(k), 3 * k, t + skew))
-
-    def release(self) -> None:
-        self.released += 1
 
 
 @pytest.fixture
@@ -101,7 +45,7 @@ def test_images_arrive_unchanged_with_calibration_and_times(camera: OakCamera, s
     for k, frame in enumerate(frames):
         np.testing.assert_array_equal(frame.color_rgb, color_of(k))
         np.testing.assert_array_equal(frame.depth_counts, depth_of(k))
-        sent_ns = nanoseconds(source.started + k * _PERIOD - timedelta(milliseconds=100))
+        sent_ns = nanoseconds(source.started + k * PERIOD - timedelta(milliseconds=100))
         assert abs(frame.t_capture_ns - sent_ns) < 200_000  # the SDK's clock is the host's; read one after the other
         assert frame.t_device_ns == sent_ns - 5_000_000_000
         assert frame.t_depth_capture_ns - frame.t_capture_ns == (2_000_000 if k else 0)
@@ -109,7 +53,7 @@ def test_images_arrive_unchanged_with_calibration_and_times(camera: OakCamera, s
     info = camera.info
     assert (info.name, info.model, info.serial, info.rate_hz) == ("r1", "OAK-D-SR", "1844", 60.0)
     assert info.depth_unit_m == 0.0001
-    assert info.color == info.depth == Intrinsics(_W, _H, 60.0, 61.0, 31.5, 23.5)
+    assert info.color == info.depth == Intrinsics(WIDTH, HEIGHT, 60.0, 61.0, 31.5, 23.5)
     np.testing.assert_array_equal(info.color_from_depth, np.eye(4))
 
 
@@ -143,7 +87,7 @@ def test_a_wrong_image_is_bad_data_and_the_next_is_read(camera: OakCamera, sourc
     camera.open()
     camera.read(_LONG_S)
     t = source.started - timedelta(milliseconds=50)
-    source.color.send(image(np.zeros((_H, 32, 3), np.uint8), 501, t))
+    source.color.send(image(np.zeros((HEIGHT, 32, 3), np.uint8), 501, t))
     source.depth.send(image(depth_of(1), 1, t))
     with pytest.raises(BadDeviceData, match="colour image 501 is RGB888i"):
         camera.read(_LONG_S)
@@ -161,14 +105,14 @@ def test_it_opens_again_and_lets_go_of_the_device_each_time(camera: OakCamera, s
 
 def _converter(offset_ns: int = 0) -> tuple[GroupConverter, CameraStats]:
     stats = CameraStats()
-    size = Intrinsics(_W, _H, 1, 1, 0, 0)
+    size = Intrinsics(WIDTH, HEIGHT, 1, 1, 0, 0)
     return GroupConverter(CameraInfo("r1", "m", "s", size, size, 1e-4, np.eye(4), 60.0), offset_ns, stats), stats
 
 
 def test_rows_padded_by_the_device_are_unpadded() -> None:
     padded = image(np.pad(color_of(3), ((0, 0), (0, 16), (0, 0))), 1, timedelta(seconds=10))
-    padded.setWidth(_W)
-    padded.setStride(3 * (_W + 16))
+    padded.setWidth(WIDTH)
+    padded.setStride(3 * (WIDTH + 16))
     depth = image(depth_of(1), 1, timedelta(seconds=10))
     padded.setTransformation(depth.getTransformation())
     converter, _ = _converter()
@@ -229,14 +173,14 @@ def test_opencv_sees_the_lens_as_depthai_states_it(coefficients: list[float], li
     given = (coefficients + [0.0] * 14)[:14]
     intrinsics = intrinsics_of(image(color_of(0), 1, timedelta(), given))
     points = np.array([[x, y, 1.0] for x in np.linspace(-0.5, 0.5, 9) for y in np.linspace(-0.38, 0.38, 7)])
-    theirs, _ = cv2.projectPoints(points, np.zeros(3), np.zeros(3), np.array(_K), np.array(given))
+    theirs, _ = cv2.projectPoints(points, np.zeros(3), np.zeros(3), np.array(MATRIX), np.array(given))
     ours, _ = cv2.projectPoints(points, np.zeros(3), np.zeros(3), intrinsics.matrix, np.array(intrinsics.distortion))
     assert np.abs(ours - theirs).max() < limit_px
 
 
 def test_an_image_without_calibration_is_refused() -> None:
     bare = image(color_of(0), 1, timedelta())
-    bare.setTransformation(dai.ImgTransformation(_W, _H))
+    bare.setTransformation(dai.ImgTransformation(WIDTH, HEIGHT))
     with pytest.raises(BadDeviceData, match="calibrat"):
         intrinsics_of(bare)
 

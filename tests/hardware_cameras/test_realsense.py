@@ -13,7 +13,7 @@ import pytest
 pytest.importorskip("pyrealsense2", reason="needs the extra realsense", exc_type=ImportError)
 
 from ghest_drivers.clock import MonotonicClock, VirtualClock
-from ghest_drivers.errors import BadDeviceData, DeviceLost, DeviceNotFound, DriverError, EndOfStream, ReadTimeout
+from ghest_drivers.errors import BadDeviceData, DeviceLost, DeviceNotFound, DriverError, EndOfStream
 from ghest_drivers.hardware.cameras.frame_queue import FrameQueue
 from ghest_drivers.hardware.cameras.stats import CameraStats
 from ghest_drivers.hardware.realsense.assembly import FrameAssembler
@@ -23,58 +23,10 @@ from ghest_drivers.hardware.realsense.settings import RealsenseSettings
 from ghest_drivers.hardware.realsense.software import SoftwareRealsense, write_bag
 from ghest_drivers.hardware.realsense.source import BagFile, ConnectedDevice
 from ghest_drivers.hardware.realsense.timestamps import TimeDomain
-from ghest_drivers.samples import CameraInfo, Intrinsics, RgbdFrame
+from ghest_drivers.samples import RgbdFrame
+from tests.hardware_cameras.realsense_rig import COLOR_FROM_DEPTH, INFO, PERIOD_NS, SETTINGS, Rig, color_of, depth_of
 
 _LONG_S = 20.0
-_PERIOD_NS = 16_666_667
-_T = np.array([[0, -1, 0, 0.025], [1, 0, 0, 0.001], [0, 0, 1, -0.002], [0, 0, 0, 1.0]])
-INFO = CameraInfo(
-    "r0",
-    "Intel RealSense SR300",
-    "S1",
-    Intrinsics(64, 48, 62, 61, 32, 24, (0.1, -0.05, 0.001, 0.0005, 0.01)),
-    Intrinsics(32, 24, 24, 25, 15.5, 12.25),
-    0.000125,
-    _T,
-    60.0,
-)
-SETTINGS = RealsenseSettings(
-    width_px=64, height_px=48, depth_width_px=32, depth_height_px=24, exposure_us=None, latency_ns=0, queue_frames=64
-)
-
-
-def color_of(k: int) -> Any:
-    return np.full((48, 64, 3), (k % 256, 7, 9), np.uint8)
-
-
-def depth_of(k: int) -> Any:
-    return np.full((24, 32), 1000 + k, np.uint16)
-
-
-class Rig:
-    """A software device, the driver on it, and a virtual host clock."""
-
-    def __init__(self, settings: RealsenseSettings = SETTINGS, **options: Any) -> None:
-        self.device = SoftwareRealsense(INFO, **options)
-        self.clock = VirtualClock(5_000_000_000)
-        self.context = self.device.context()
-        self.unix_ns = 1_700_000_000_000_000_000 - 5_000_000_000
-        source = ConnectedDevice("S1", settings.latency_ns, lambda: self.unix_ns + self.clock.now_ns())
-        self.camera = RealsenseCamera("r0", source, settings, self.clock, context=lambda: self.context)
-
-    def send(self, k: int, t_device_ns: int, *, domain: TimeDomain = TimeDomain.HARDWARE, streams: str = "dc") -> None:
-        if "d" in streams:
-            self.device.send_depth(depth_of(k), k, t_device_ns, domain)
-        if "c" in streams:
-            self.device.send_color(color_of(k), 100 + k, t_device_ns, domain)
-
-    def read_all(self) -> list[RgbdFrame]:
-        frames = []
-        while True:
-            try:
-                frames.append(self.camera.read(0.0))
-            except ReadTimeout:
-                return frames
 
 
 @pytest.fixture
@@ -89,7 +41,7 @@ def test_it_states_the_calibration_of_the_device(rig: Rig) -> None:
     info = rig.camera.info
     assert (info.name, info.model, info.serial, info.rate_hz) == ("r0", "Intel RealSense SR300", "S1", 60.0)
     assert info.depth_unit_m == 0.000125
-    np.testing.assert_allclose(info.color_from_depth, _T, atol=1e-7)
+    np.testing.assert_allclose(info.color_from_depth, COLOR_FROM_DEPTH, atol=1e-7)
     np.testing.assert_allclose(info.color.matrix, INFO.color.matrix)
     np.testing.assert_allclose(info.color.distortion, INFO.color.distortion, rtol=1e-6)
     np.testing.assert_allclose(info.depth.matrix, INFO.depth.matrix)
@@ -97,22 +49,22 @@ def test_it_states_the_calibration_of_the_device(rig: Rig) -> None:
 
 def test_images_arrive_unchanged_and_paired(rig: Rig) -> None:
     for k in range(5):
-        rig.clock.sleep_until_ns(6_000_000_000 + k * _PERIOD_NS)
-        rig.send(k, 1_000_000_000 + k * _PERIOD_NS)
+        rig.clock.sleep_until_ns(6_000_000_000 + k * PERIOD_NS)
+        rig.send(k, 1_000_000_000 + k * PERIOD_NS)
     frames = rig.read_all()
     assert [frame.seq for frame in frames] == [0, 1, 2, 3, 4]
     for k, frame in enumerate(frames):
         np.testing.assert_array_equal(frame.color_rgb, color_of(k))
         np.testing.assert_array_equal(frame.depth_counts, depth_of(k))
-        assert frame.t_device_ns == 1_000_000_000 + k * _PERIOD_NS
-        assert frame.t_arrival_ns == 6_000_000_000 + k * _PERIOD_NS
+        assert frame.t_device_ns == 1_000_000_000 + k * PERIOD_NS
+        assert frame.t_arrival_ns == 6_000_000_000 + k * PERIOD_NS
 
 
 def test_frames_are_stamped_with_device_time_and_not_with_their_arrival(rig: Rig) -> None:
     rng = np.random.default_rng(1)
     host_minus_device_ns = 3_000_000_000
     for k in range(200):
-        t_ns = 1_000_000_000 + k * _PERIOD_NS
+        t_ns = 1_000_000_000 + k * PERIOD_NS
         rig.clock.sleep_until_ns(t_ns + host_minus_device_ns + int(rng.exponential(3e6)))
         rig.send(k, t_ns)
     errors = np.array([frame.t_capture_ns - frame.t_device_ns - host_minus_device_ns for frame in rig.read_all()[-50:]])
@@ -133,7 +85,7 @@ def test_without_a_stated_latency_one_frame_period_is_assumed() -> None:
     rig = Rig(replace(SETTINGS, latency_ns=None))
     rig.camera.open()
     rig.send(0, 1_000_000_000)
-    assert rig.camera.read(0.0).t_capture_ns == rig.clock.now_ns() - _PERIOD_NS
+    assert rig.camera.read(0.0).t_capture_ns == rig.clock.now_ns() - PERIOD_NS
     rig.camera.close()
 
 
@@ -148,20 +100,20 @@ def test_capture_times_run_on_over_the_wrap_of_the_counter(rig: Rig) -> None:
     wrap_ns = (1 << 32) * 1000
     frames = []
     for k in range(120):
-        t_ns = wrap_ns - 60 * _PERIOD_NS + k * _PERIOD_NS
-        rig.clock.sleep_until_ns(6_000_000_000 + k * _PERIOD_NS)
+        t_ns = wrap_ns - 60 * PERIOD_NS + k * PERIOD_NS
+        rig.clock.sleep_until_ns(6_000_000_000 + k * PERIOD_NS)
         rig.send(k, t_ns % wrap_ns)
         frames += rig.read_all()
     assert len(frames) == 120
     steps = np.diff([frame.t_capture_ns for frame in frames])
-    assert abs(steps - _PERIOD_NS).max() < 100_000
+    assert abs(steps - PERIOD_NS).max() < 100_000
     assert rig.camera.stats.clock_suspect == 0
 
 
 def test_a_clock_that_steps_back_costs_a_few_frames_and_never_a_wrong_time(rig: Rig) -> None:
     for k in range(60):
-        rig.clock.sleep_until_ns(6_000_000_000 + k * _PERIOD_NS)
-        rig.send(k, (9_000_000_000 if k < 40 else 2_000_000_000) + k * _PERIOD_NS)
+        rig.clock.sleep_until_ns(6_000_000_000 + k * PERIOD_NS)
+        rig.send(k, (9_000_000_000 if k < 40 else 2_000_000_000) + k * PERIOD_NS)
     frames = rig.read_all()
     assert len(frames) >= 54
     for frame in frames:
@@ -182,8 +134,8 @@ def test_depth_that_is_late_is_waited_for_and_depth_that_never_comes_is_not(rig:
     rig.send(0, t0_ns + 3_000_000, streams="d")
     assert rig.read_all()[0].depth_counts is not None
     for k in (1, 2, 3):
-        rig.clock.sleep_until_ns(rig.clock.now_ns() + _PERIOD_NS)
-        rig.send(k, t0_ns + k * _PERIOD_NS, streams="c")
+        rig.clock.sleep_until_ns(rig.clock.now_ns() + PERIOD_NS)
+        rig.send(k, t0_ns + k * PERIOD_NS, streams="c")
     (frame,) = rig.read_all()
     assert frame.seq == 1
     assert frame.depth_counts is None
@@ -193,8 +145,8 @@ def test_depth_that_is_late_is_waited_for_and_depth_that_never_comes_is_not(rig:
 
 def test_a_gap_in_the_device_numbers_is_a_gap_in_seq(rig: Rig) -> None:
     for k in (0, 1, 4, 5):
-        rig.clock.sleep_until_ns(6_000_000_000 + k * _PERIOD_NS)
-        rig.send(k, 1_000_000_000 + k * _PERIOD_NS)
+        rig.clock.sleep_until_ns(6_000_000_000 + k * PERIOD_NS)
+        rig.send(k, 1_000_000_000 + k * PERIOD_NS)
     assert [frame.seq for frame in rig.read_all()] == [0, 1, 4, 5]
     assert rig.camera.stats.missing == 2
 
@@ -246,8 +198,8 @@ def test_a_reader_that_is_late_gets_the_newest_frames() -> None:
     rig = Rig(replace(SETTINGS, queue_frames=4))
     rig.camera.open()
     for k in range(10):
-        rig.clock.sleep_until_ns(6_000_000_000 + k * _PERIOD_NS)
-        rig.send(k, 1_000_000_000 + k * _PERIOD_NS)
+        rig.clock.sleep_until_ns(6_000_000_000 + k * PERIOD_NS)
+        rig.send(k, 1_000_000_000 + k * PERIOD_NS)
     assert [frame.seq for frame in rig.read_all()] == [6, 7, 8, 9]
     assert rig.camera.stats.overruns == 6
     rig.camera.close()
@@ -356,7 +308,7 @@ def test_unplugging_is_noticed_without_a_timeout(bag: Path) -> None:
 @pytest.fixture(scope="module")
 def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path: Path = tmp_path_factory.mktemp("bag") / "recorded.bag"
-    t_ns = [7_000_000_000 + k * _PERIOD_NS for k in range(30)]
+    t_ns = [7_000_000_000 + k * PERIOD_NS for k in range(30)]
     frames = [RgbdFrame(INFO, k, color_of(k), depth_of(k), t, t, t, t) for k, t in enumerate(t_ns)]
     assert write_bag(path, INFO, frames, MonotonicClock()) == 30
     return path
@@ -384,7 +336,7 @@ def test_a_bag_gives_back_every_frame_and_the_calibration(bag: Path, real_time: 
         np.testing.assert_array_equal(frame.color_rgb, color_of(k))
         np.testing.assert_array_equal(frame.depth_counts, depth_of(k))
     assert info.depth_unit_m == 0.000125
-    np.testing.assert_allclose(info.color_from_depth, _T, atol=1e-7)
+    np.testing.assert_allclose(info.color_from_depth, COLOR_FROM_DEPTH, atol=1e-7)
     np.testing.assert_allclose(info.color.distortion, INFO.color.distortion, rtol=1e-6)
 
 
@@ -392,7 +344,7 @@ def test_a_bag_read_as_fast_as_possible_waits_for_a_slow_reader_and_keeps_its_ow
     frames = _play(bag_camera("r0", bag, replace(SETTINGS, queue_frames=2), VirtualClock(), real_time=False), pause_s=0.01)
     times_ns = [frame.t_capture_ns for frame in frames]
     assert len(times_ns) == 30
-    np.testing.assert_allclose(times_ns, [7_000_000_000 + k * _PERIOD_NS for k in range(30)], atol=2000)
+    np.testing.assert_allclose(times_ns, [7_000_000_000 + k * PERIOD_NS for k in range(30)], atol=2000)
 
 
 def test_what_the_driver_records_to_a_bag_can_be_played_back(tmp_path: Path) -> None:
@@ -400,8 +352,8 @@ def test_what_the_driver_records_to_a_bag_can_be_played_back(tmp_path: Path) -> 
     rig = Rig(replace(SETTINGS, record_bag=path))
     rig.camera.open()
     for k in range(5):
-        rig.clock.sleep_until_ns(6_000_000_000 + k * _PERIOD_NS)
-        rig.send(k, 1_000_000_000 + k * _PERIOD_NS)
+        rig.clock.sleep_until_ns(6_000_000_000 + k * PERIOD_NS)
+        rig.send(k, 1_000_000_000 + k * PERIOD_NS)
         time.sleep(0.01)
     assert len(rig.read_all()) == 5
     rig.camera.close()
