@@ -50,7 +50,7 @@ class RealsenseBagBackend(RealsenseStreams):
     """A .bag recording played back as if it were the camera (needs the extra `realsense`)."""
 
     backend: Literal["realsense_bag"]
-    path: str
+    path: str = Field(description="The recording, relative to the station file")
     width_px: int = Field(default=640, ge=16, le=4096)
     height_px: int = Field(default=480, ge=16, le=4096)
     rate_hz: int = Field(default=60, ge=1, le=300)

@@ -1,11 +1,13 @@
 """The devices that a station file names, through the driver layer's factory."""
 
 from collections.abc import Mapping
+from pathlib import Path
 
 from ghest_drivers.clock import Clock
 from ghest_drivers.errors import DriverError
 from ghest_drivers.factory import make_camera, make_encoders
 from ghest_drivers.interfaces import EncoderLink, RgbdCamera
+from ghest_rt.config.camera_devices import RealsenseBagBackend
 from ghest_rt.config.devices import SimBackend
 from ghest_rt.config.load import LoadedStation
 from ghest_rt.config.station import Camera, StationConfig
@@ -42,7 +44,7 @@ def make_devices(
     """
     config = station.config
     try:
-        cameras = {name: _camera(name, camera, clock, sim_settings) for name, camera in config.cameras.items()}
+        cameras = {name: _camera(name, camera, station, clock, sim_settings) for name, camera in config.cameras.items()}
         if isinstance(config.encoders.device, SimBackend):
             return cameras, make_encoders("sim", clock, sim_settings)
         return cameras, make_encoder_link(station, clock)
@@ -50,8 +52,11 @@ def make_devices(
         raise DeviceError(str(error)) from error
 
 
-def _camera(name: str, camera: Camera, clock: Clock, sim_settings: Mapping[str, object]) -> RgbdCamera:
+def _camera(name: str, camera: Camera, station: LoadedStation, clock: Clock, sim_settings: Mapping[str, object]) -> RgbdCamera:
     device = camera.device
     if isinstance(device, SimBackend):
         return make_camera("sim", name, clock, sim_settings)
-    return make_camera(device.backend, name, clock, device.model_dump(exclude={"backend"}))
+    settings = device.model_dump(exclude={"backend"})
+    if isinstance(device, RealsenseBagBackend):
+        settings["path"] = str(Path(station.source).parent / device.path)
+    return make_camera(device.backend, name, clock, settings)
