@@ -23,8 +23,9 @@ from ghest_rt.estimation.pipeline import Pipeline
 from ghest_rt.recording.reader import Recording, open_recordings
 from ghest_rt.service.clocks import ScaledClock
 from ghest_rt.service.compose import AnglesComposer, Numbering
+from ghest_rt.service.contract import ServiceSettings
 from ghest_rt.service.inputs import InputSettings
-from ghest_rt.service.loop import Service, ServiceSettings
+from ghest_rt.service.loop import Service
 from ghest_rt.service.outputs import Output
 from ghest_rt.service.run import run_service
 from ghest_rt.service.stop_signals import StopSignals

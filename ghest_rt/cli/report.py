@@ -10,8 +10,8 @@ from rich.table import Table
 from ghest_rt.cli.console import print_json
 from ghest_rt.cli.scoreboard import Scoreboard
 from ghest_rt.messages.published import Lateness
+from ghest_rt.service.contract import ServiceSummary
 from ghest_rt.service.health import SampleCounts
-from ghest_rt.service.loop import ServiceSummary
 
 
 @dataclass(frozen=True, slots=True)

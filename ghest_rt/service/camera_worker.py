@@ -7,10 +7,12 @@ import threading
 from collections.abc import Callable
 from typing import TypeVarTuple, Unpack
 
+import numpy as np
+
 from ghest_drivers.clock import Clock
 from ghest_drivers.errors import BadDeviceData, DeviceLost, DriverError, EndOfStream, ReadTimeout
 from ghest_drivers.interfaces import RgbdCamera
-from ghest_drivers.samples import RgbdFrame
+from ghest_drivers.samples import CameraInfo, RgbdFrame
 from ghest_rt.messages.published import EventKind, InputState
 from ghest_rt.messages.results import MarkerObservation
 from ghest_rt.service.inputs import InputCounters, InputListener, InputSettings, Severity
@@ -165,3 +167,13 @@ class CameraWorker:
             self._camera.close()
         except Exception:
             _log.exception("camera %s: close failed", self._name)
+
+
+def same_camera(a: CameraInfo, b: CameraInfo) -> bool:
+    """Return whether two descriptions of a camera give the same geometry."""
+    return (
+        a.color == b.color
+        and a.depth == b.depth
+        and a.depth_unit_m == b.depth_unit_m
+        and bool(np.array_equal(a.color_from_depth, b.color_from_depth))
+    )

@@ -4,23 +4,21 @@ import asyncio
 import gc
 import logging
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from typing import Protocol
-
-import numpy as np
+from dataclasses import replace
 
 from ghest_drivers.interfaces import EncoderLink, RgbdCamera
 from ghest_drivers.samples import CameraInfo, EncoderInfo, EncoderSample, RgbdFrame
 from ghest_rt.errors import DeviceError
-from ghest_rt.messages.published import Event, EventKind, InputState, Lateness
+from ghest_rt.messages.published import Event, EventKind, InputState
 from ghest_rt.messages.results import GhEstimate, MarkerObservation, Reason, Status
 from ghest_rt.service.alarm import Alarm, make_alarm
-from ghest_rt.service.camera_worker import CameraWorker
+from ghest_rt.service.camera_worker import CameraWorker, same_camera
 from ghest_rt.service.clocks import ServiceClock
 from ghest_rt.service.compose import AnglesComposer
+from ghest_rt.service.contract import MakePipeline, PipelineLike, ServiceSettings, ServiceSummary
 from ghest_rt.service.encoder_worker import ENCODERS, EncoderWorker
 from ghest_rt.service.health import HealthMeter, SampleCounts, lateness
-from ghest_rt.service.inputs import InputCounters, InputSettings, Severity
+from ghest_rt.service.inputs import Severity
 from ghest_rt.service.outputs import Output
 from ghest_rt.service.pacing import Pacer
 from ghest_rt.sync.grid import Grid
@@ -32,65 +30,6 @@ _HEALTH_PERIOD_NS = 1_000_000_000
 _ABSENT = ((ENCODERS, Reason.ENCODERS_SILENT), ("r0", Reason.R0_NO_FRAMES), ("r1", Reason.R1_NO_FRAMES))
 _CAME_TOO_LATE = (Reason.R0_NO_FRAMES, Reason.R1_NO_FRAMES, Reason.ENCODERS_SILENT)
 _LEVELS = {"info": logging.INFO, "warning": logging.WARNING, "error": logging.ERROR}
-
-
-class PipelineLike(Protocol):
-    """From frames and encoder samples to estimates (`ghest_rt.estimation.pipeline.Pipeline`)."""
-
-    def observe(self, frame: RgbdFrame) -> MarkerObservation:
-        """Find the marker in a frame; called on that camera's thread."""
-        ...
-
-    def add(self, item: MarkerObservation | EncoderSample) -> None:
-        """Take in a result of `observe` or an encoder sample; called on the loop's thread."""
-        ...
-
-    def estimate(self, t_ns: int) -> GhEstimate:
-        """Return the joint at `t_ns`; called on the loop's thread."""
-        ...
-
-
-MakePipeline = Callable[[dict[str, CameraInfo], tuple[str, ...]], PipelineLike]
-
-
-@dataclass(frozen=True, slots=True)
-class ServiceSettings:
-    """What the service needs to know of the station.
-
-    Attributes:
-        rate_hz: Grid rate.
-        lag_ns: A sample is published this long after the instant it holds for.
-        inputs: How devices are watched.
-    """
-
-    rate_hz: float
-    lag_ns: int
-    inputs: InputSettings = field(default_factory=InputSettings)
-
-
-@dataclass(frozen=True, slots=True)
-class ServiceSummary:
-    """What a run of the service came to.
-
-    Attributes:
-        duration_s: From the instant of the first sample after the start to that of the last one, on the service's clock.
-        published: Samples published.
-        valid: Of these with status valid.
-        degraded: Of these with status degraded.
-        starting: Of these before every input had arrived.
-        missed_ticks: Grid slots skipped.
-        lateness: How late the ticks came.
-        inputs: Counters of every input.
-    """
-
-    duration_s: float
-    published: int
-    valid: int
-    degraded: int
-    starting: int
-    missed_ticks: int
-    lateness: Lateness
-    inputs: Mapping[str, InputCounters]
 
 
 class Service:
@@ -343,13 +282,3 @@ class Service:
         if late:
             _log.warning("a device did not close in %.1f s and is left behind", _STOP_TIMEOUT_S)
             await asyncio.wait(late, timeout=0.1)
-
-
-def same_camera(a: CameraInfo, b: CameraInfo) -> bool:
-    """Return whether two descriptions of a camera give the same geometry."""
-    return (
-        a.color == b.color
-        and a.depth == b.depth
-        and a.depth_unit_m == b.depth_unit_m
-        and bool(np.array_equal(a.color_from_depth, b.color_from_depth))
-    )

@@ -5,7 +5,8 @@ import importlib.util
 import logging
 from collections.abc import Callable
 
-from ghest_rt.service.loop import Service, ServiceSummary
+from ghest_rt.service.contract import ServiceSummary
+from ghest_rt.service.loop import Service
 from ghest_rt.service.process import punctual_process
 from ghest_rt.service.stop_signals import StopSignals
 

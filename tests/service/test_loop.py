@@ -14,8 +14,9 @@ from ghest_rt.messages.published import EventKind, InputState
 from ghest_rt.messages.results import Reason, Status
 from ghest_rt.service.clocks import ScaledClock
 from ghest_rt.service.compose import AnglesComposer, Numbering
+from ghest_rt.service.contract import PipelineLike, ServiceSettings, ServiceSummary
 from ghest_rt.service.inputs import Backoff, InputSettings
-from ghest_rt.service.loop import PipelineLike, Service, ServiceSettings, ServiceSummary
+from ghest_rt.service.loop import Service
 from tests.service.fakes import END, Collector, FakeCamera, FakeEncoders, FakePipeline, encoder_sample, frame
 
 LAG_NS = 20_000_000
@@ -103,11 +104,12 @@ async def test_the_grid_is_anchored_at_the_first_instant_that_both_cameras_saw()
         rig.feed(cameras=("r0",))
         await asyncio.sleep(0.01)
         first_ns = rig.feed(1, cameras=("r1",))
-        await rig.out.until(lambda: bool(rig.pipelines) and first_ns + 5_000_000 in rig.pipelines[0].asked_ns)
+        await rig.out.until(lambda: bool(rig.pipelines) and len(rig.pipelines[0].asked_ns) >= 3)
 
     await rig.during(scene)
-    after = [t_ns for t_ns in rig.pipelines[0].asked_ns if t_ns >= first_ns]
-    assert all((t_ns - first_ns) % 5_000_000 == 0 for t_ns in after)
+    asked_ns = rig.pipelines[0].asked_ns
+    assert min(asked_ns) >= first_ns
+    assert all((t_ns - first_ns) % 5_000_000 == 0 for t_ns in asked_ns)
 
 
 async def test_a_lost_camera_is_reported_and_opened_again() -> None:
