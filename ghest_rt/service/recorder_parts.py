@@ -10,6 +10,7 @@ from ghest_drivers.samples import CameraInfo
 from ghest_rt.config.load import LoadedStation
 from ghest_rt.errors import BadInputError, GhestError
 from ghest_rt.recording.writer import RecordingWriter
+from ghest_rt.service.loop import same_camera
 from ghest_rt.service.recorder_settings import RecorderSettings
 from ghest_rt.service.recorder_sync import DiskSync
 
@@ -57,6 +58,7 @@ class Parts:
         self._infos: dict[str, CameraInfo] = {}
         self._newest_ns: dict[str, int] = {}
         self._closed_bytes = 0
+        self._closed = False
         self._begun_ns = now_ns
         self._flushed_s = time.monotonic()
         self.files: list[Path] = []
@@ -66,7 +68,7 @@ class Parts:
     @property
     def written_bytes(self) -> int:
         """Size of all files together."""
-        return self._closed_bytes + self.writer.size_bytes
+        return self._closed_bytes + (0 if self._closed else self.writer.size_bytes)
 
     def add_camera(self, info: CameraInfo, t_ns: int) -> None:
         """Note a camera's facts. If they have changed, another part begins: they hold for a whole file."""
@@ -107,6 +109,7 @@ class Parts:
         try:
             self.writer.close()
         finally:
+            self._closed = True
             self._closed_bytes = sum(file.stat().st_size for file in self.files if file.exists())
             self._sync.stop(self._settings.drain_s)
 
@@ -130,3 +133,12 @@ class Parts:
         self._sync.watch(writer.fileno())
         _sync_folder(path.parent)
         return writer
+
+
+def _sync_folder(folder: Path) -> None:
+    """Make a new file's name last, too."""
+    fd = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(fd)
+    finally:
+        os.close(fd)
