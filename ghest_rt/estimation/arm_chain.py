@@ -33,6 +33,9 @@ class ArmChain:
 
     Attributes:
         limits: (n, 2) limits of the measured joints, rad or m.
+        m0_from_gh: (4, 4) GH joint frame in the m0 frame, by calibration.
+        m1_from_elw: (4, 4) elbow frame in the m1 frame, by calibration.
+        sigma_limit_rad: The station's limit on a standard deviation.
     """
 
     def __init__(self, config: StationConfig, urdf_text: str, source: str, encoder_joints: Sequence[str]) -> None:
@@ -57,9 +60,9 @@ class ArmChain:
         )
         self.limits = self._fk.limits
         self._link_from_camera = {camera: config.calibration.link_from_camera_array(camera) for camera in CAMERAS}
-        self._m0_from_gh = np.array(config.calibration.m0_from_gh)
-        self._m1_from_elw = np.array(config.calibration.m1_from_elw)
-        self._sigma_limit_rad = math.radians(config.estimator.sigma_limit_deg)
+        self.m0_from_gh = np.array(config.calibration.m0_from_gh)
+        self.m1_from_elw = np.array(config.calibration.m1_from_elw)
+        self.sigma_limit_rad = math.radians(config.estimator.sigma_limit_deg)
         self._still_camera = {
             camera: eq6_e_from_camera(self._fk.link_pose(link, np.zeros(len(encoder_joints))), self._link_from_camera[camera])
             for camera, link in self._link.items()
@@ -69,6 +72,18 @@ class ArmChain:
     def needs_encoders(self, camera: str) -> bool:
         """Say whether a camera's pose depends on the encoders (that of a camera on the base does not)."""
         return camera not in self._still_camera
+
+    def e_from_camera(self, camera: str, joint_positions: Array) -> Array:
+        """Return a camera in E, equation (6): (4, 4), metres.
+
+        Args:
+            camera: The camera.
+            joint_positions: (n,) rad (m for prismatic joints); not used where the camera stands still.
+        """
+        still = self._still_camera.get(camera)
+        if still is not None:
+            return still
+        return eq6_e_from_camera(self._fk.link_pose(self._link[camera], joint_positions), self._link_from_camera[camera])
 
     def marker_in_e(self, observation: MarkerObservation, joints: JointState | None) -> PoseSample | None:
         """Return a marker's pose in E, equations (6) and (7).
@@ -87,8 +102,7 @@ class ArmChain:
         if e_from_camera is None:
             if joints is None:
                 return None
-            e_from_link = self._fk.link_pose(self._link[camera], joints.positions)
-            e_from_camera = eq6_e_from_camera(e_from_link, self._link_from_camera[camera])
+            e_from_camera = self.e_from_camera(camera, joints.positions)
         else:
             joints = None
         return PoseSample(
@@ -115,13 +129,13 @@ class ArmChain:
         encoders_ns = [ns for ns in (m0.encoders_ns, m1.encoders_ns) if ns is not None]
         if encoders_ns:
             used_ns["encoders"] = max(encoders_ns)
-        e_from_gh = eq8_e_from_gh(m0.e_from_marker, self._m0_from_gh)
-        e_from_elw = eq9_e_from_elw(m1.e_from_marker, self._m1_from_elw)
+        e_from_gh = eq8_e_from_gh(m0.e_from_marker, self.m0_from_gh)
+        e_from_elw = eq9_e_from_elw(m1.e_from_marker, self.m1_from_elw)
         e_from_arm = step3_4_5_e_from_arm(e_from_gh, e_from_elw)
         if e_from_arm is None:
             return lost(t_ns, Reason.UNCERTAIN, used_ns)
         m0_from_arm = eq10_m0_from_arm(m0.e_from_marker, e_from_arm)
-        gh_from_arm = gh_from_arm_rotation(self._m0_from_gh, m0_from_arm)
+        gh_from_arm = gh_from_arm_rotation(self.m0_from_gh, m0_from_arm)
         covariance = None
         if m0.covariance is not None and m1.covariance is not None:
             J_0, J_1 = rotation_jacobians(m0.e_from_marker, m1.e_from_marker, e_from_gh, e_from_elw, e_from_arm)
@@ -141,7 +155,7 @@ class ArmChain:
 
     def _weakness(self, m0: PoseSample, m1: PoseSample, gh_from_arm: Array, covariance: Array | None) -> Reason:
         """Return the gravest reason why angles that are there are not plainly valid."""
-        if covariance is not None and max(euler_sigma_rad(gh_from_arm, covariance)) > self._sigma_limit_rad:
+        if covariance is not None and max(euler_sigma_rad(gh_from_arm, covariance)) > self.sigma_limit_rad:
             return Reason.UNCERTAIN
         if m0.color_only or m1.color_only:
             return Reason.COLOR_ONLY

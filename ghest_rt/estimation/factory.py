@@ -5,11 +5,12 @@ from typing import Literal
 
 from ghest_rt.config.station import StationConfig
 from ghest_rt.estimation.arm_chain import CAMERAS, ArmChain
+from ghest_rt.estimation.fused.estimator import FusedEstimator
 from ghest_rt.estimation.interface import GhEstimator
 from ghest_rt.estimation.paper import PaperEstimator
 from ghest_rt.estimation.refined import RefinedEstimator
 
-EstimatorMethod = Literal["paper", "refined"]
+EstimatorMethod = Literal["paper", "refined", "fused"]
 
 
 def make_estimator(
@@ -38,6 +39,9 @@ def make_estimator(
     max_gap_ns = round(config.estimator.max_gap_ms * 1e6)
     rates = frame_rate_hz or {}
     period_ns = {camera: round(1e9 / (rates.get(camera) or config.rate_hz)) for camera in CAMERAS}
-    if (method or config.estimator.method) == "paper":
+    chosen = method or config.estimator.method
+    if chosen == "paper":
         return PaperEstimator(chain, max_gap_ns, period_ns)
+    if chosen == "fused":
+        return FusedEstimator(chain, max_gap_ns, period_ns)
     return RefinedEstimator(chain, max_gap_ns, period_ns, config.estimator.encoder_pairing)

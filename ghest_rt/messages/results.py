@@ -74,7 +74,37 @@ class Reason(StrEnum):
     FEWER_DISKS = "fewer_disks"
     UNCERTAIN = "uncertain"  # sigma above the station's limit
     BRIDGED = "bridged"  # interpolated over a gap longer than normal
+    MARKER_DRIFT = "marker_drift"  # a marker has moved on its bone; compensated as far as that can be seen
     END_OF_RECORDING = "end_of_recording"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MarkerDrift:
+    """How far a marker has moved on its bone since the calibration.
+
+    Attributes:
+        flagged: Whether it has, beyond what calibration leaves open.
+        probability: Of that.
+        slide_m: (3,) displacement, axes of the marker as calibrated.
+        slide_sigma_m: (3,) its standard deviations: large where the data say nothing.
+        turn_rad: (3,) rotation vector, same axes.
+        turn_sigma_rad: (3,) its standard deviations.
+    """
+
+    flagged: bool
+    probability: float
+    slide_m: Array
+    slide_sigma_m: Array
+    turn_rad: Array
+    turn_sigma_rad: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DriftReport:
+    """The drift of both markers."""
+
+    m0: MarkerDrift
+    m1: MarkerDrift
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -91,6 +121,7 @@ class GhEstimate:
         e_from_m1: (4, 4) marker m1 in the exoskeleton base frame, eq. (7); None when lost.
         covariance: (3, 3) of the rotation error (rad, GH axes): true rotation = exp(error) gh_from_arm; None if unknown.
         newest_ns: Capture time of the newest sample used of each input ("r0", "r1", "encoders"); absent if never seen.
+        drift: Whether markers have moved on their bones; None where the method does not look.
     """
 
     t_sample_ns: int
@@ -102,6 +133,7 @@ class GhEstimate:
     e_from_m1: Array | None
     covariance: Array | None
     newest_ns: dict[str, int]
+    drift: DriftReport | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,0 +1,116 @@
+"""What the filter believes at one instant: a point on the manifold and the covariance of the error around it."""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ghest_rt.geometry.se3 import transform
+from ghest_rt.geometry.so3 import Array, exp_so3
+
+# The error state, in this order, all in E axes but the last two. Rotation errors are left perturbations: true = exp(error) R.
+ACROMION = slice(0, 3)
+GH = slice(3, 6)
+ARM = slice(6, 9)
+POSES = slice(0, 9)
+ACROMION_RATE = slice(9, 12)
+GH_RATE = slice(12, 15)
+ARM_RATE = slice(15, 18)
+RATES = slice(9, 18)
+GH_IN_MARKER = (slice(18, 21), slice(21, 24))
+BOTH_GH = slice(18, 24)
+SIZE = 24
+
+_EYE_3 = np.eye(3)
+
+
+@dataclass(slots=True, eq=False)
+class Streak:
+    """Outliers of one marker in a row.
+
+    Attributes:
+        count: How many alike.
+        since_ns: Capture time of the first of these.
+        length: How many in a row, alike or not.
+        residual: (6,) innovation of the last: rotation rad, position m, E axes.
+    """
+
+    count: int = 0
+    length: int = 0
+    since_ns: int = 0
+    residual: Array = field(default_factory=lambda: np.zeros(6))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Base:
+    """How a marker sits on its bone: as calibrated, until it is seen to jump.
+
+    Attributes:
+        slide: (3,) displacement, axes of the marker as calibrated, m.
+        turn: (3, 3) calibrated_from_actual.
+        slide_variance: Of each component of the slide, m^2, beyond calibration.
+        turn_variance: Of each component of the turn, rad^2.
+        jumped: Whether it has ever jumped.
+    """
+
+    slide: Array = field(default_factory=lambda: np.zeros(3))
+    turn: Array = field(default_factory=lambda: np.eye(3))
+    slide_variance: float = 0.0
+    turn_variance: float = 0.0
+    jumped: bool = False
+
+
+@dataclass(slots=True, eq=False)
+class Belief:
+    """State of the filter. Arrays are replaced, never written to, except `P` by the owner of a copy.
+
+    Attributes:
+        t_ns: The instant.
+        e_from_r1: (4, 4) camera r1 in E at that instant, equation (6).
+        e_from_marker: (3, 3) orientations of m0 and of m1 in E.
+        p_gh: (3,) GH centre in E, m.
+        rates: (9,) of m0 (rad/s), of the GH centre (m/s), of m1 beyond what the encoders tell (rad/s); E axes.
+        gh_in_marker: (3,) GH centre in the frame of m0 as it is, and in that of m1, m.
+        P: (24, 24) covariance of the error state.
+        agility: Factor on the process noise of m0 with the GH centre, and of m1.
+        seen_ns: Capture time of the last measurement accepted of m0 and m1.
+        surprise: Of m0 and m1: (3,) the last innovation of the rotation, whitened.
+        streaks: Outliers in a row of m0 and m1.
+        base: How m0 and m1 sit on their bones, jumps included.
+    """
+
+    t_ns: int
+    e_from_r1: Array
+    e_from_marker: tuple[Array, Array]
+    p_gh: Array
+    rates: Array
+    gh_in_marker: tuple[Array, Array]
+    P: Array
+    agility: tuple[float, float]
+    seen_ns: tuple[int, int]
+    surprise: tuple[Array, Array] = field(default_factory=lambda: (np.zeros(3), np.zeros(3)))
+    streaks: tuple[Streak, Streak] = field(default_factory=lambda: (Streak(), Streak()))
+    base: tuple[Base, Base] = field(default_factory=lambda: (Base(), Base()))
+
+    def copy(self) -> "Belief":
+        """Return a copy that may be moved on without touching this one."""
+        return replace(self, P=self.P.copy())
+
+    def e_from(self, marker: int) -> Array:
+        """Return the (4, 4) pose of m0 (0) or m1 (1) in E, equation (7)."""
+        R = self.e_from_marker[marker]
+        return transform(R, self.p_gh - R @ self.gh_in_marker[marker])
+
+    def shift(self, error: Array) -> None:
+        """Move the point by a (24,) error state."""
+        m0, m1 = self.e_from_marker
+        self.e_from_marker = (turned(error[ACROMION], m0), turned(error[ARM], m1))
+        self.p_gh = self.p_gh + error[GH]
+        self.rates = self.rates + error[RATES]
+        in_m0, in_m1 = self.gh_in_marker
+        self.gh_in_marker = (in_m0 + error[GH_IN_MARKER[0]], in_m1 + error[GH_IN_MARKER[1]])
+
+
+def turned(rotvec_rad: Array, R: Array) -> Array:
+    """Return exp(rotvec) R, drawn back onto the rotations (first order: rounding never accumulates)."""
+    moved = exp_so3(rotvec_rad) @ R
+    return np.asarray(moved @ (1.5 * _EYE_3 - 0.5 * (moved.T @ moved)))

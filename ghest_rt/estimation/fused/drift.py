@@ -1,0 +1,186 @@
+"""Has a marker moved on its bone? Sixteen answers weighed against each other; section 6 of docs/fused-estimator.md."""
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+
+from ghest_rt.estimation.fused.belief import ACROMION, ARM, BOTH_GH, GH, POSES, Belief, turned
+from ghest_rt.estimation.fused.tuning import Tuning
+from ghest_rt.geometry.so3 import Array, exp_so3, skew
+
+# The drift of both markers and the arm length, in this order.
+SLIDE = (slice(0, 3), slice(6, 9))
+TURN = (slice(3, 6), slice(9, 12))
+LENGTH = 12
+DRIFT_SIZE = 13
+# What a posture consists of: scapula, GH centre, humerus, drift.
+_POSTURE = 9
+_ROWS = np.r_[0:9, 18:24]
+# An answer this unlikely is left out.
+_NEGLIGIBLE = 1e-2
+# The arm length is taken anew into the geometry when it has changed by this much.
+_LENGTH_STEP_M = 0.004
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Posture:
+    """The bones, and the drift that was taken out.
+
+    Attributes:
+        e_from_gh: (4, 4) GH joint frame in E, equation (8).
+        e_from_elw: (4, 4) elbow frame in E, equation (9).
+        covariance: (22, 22) of the errors of scapula (rad, left, E axes), GH centre (m, E axes), humerus (rad, left, E axes),
+            and drift: slide (m, nominal marker axes) and turn (rad, marker axes) of m0, of m1, arm length (m).
+        slide: (3,) of m0 and m1, in the axes of the marker as calibrated, m.
+        turn: (3, 3) of m0 and m1: calibrated_from_actual.
+        drifted: Probability that m0, and that m1, is not where calibration says.
+    """
+
+    e_from_gh: Array
+    e_from_elw: Array
+    covariance: Array
+    slide: tuple[Array, Array]
+    turn: tuple[Array, Array]
+    drifted: tuple[float, float]
+
+
+class DriftJudge:
+    """Weighs which of slide and turn of m0 and m1 there are: by how well each answer explains where the GH centre is found."""
+
+    def __init__(self, tuning: Tuning, m0_from_gh: Array, m1_from_elw: Array, arm_length_m: float | None) -> None:
+        """Prepare the answers.
+
+        Args:
+            tuning: Priors.
+            m0_from_gh: (4, 4) GH joint frame in the m0 frame, equation (8).
+            m1_from_elw: (4, 4) elbow frame in the m1 frame, equation (9).
+            arm_length_m: From elbow to GH centre, where calibrated.
+        """
+        self._m0_from_gh = m0_from_gh
+        self._m1_from_elw = m1_from_elw
+        self._arm_length_m = arm_length_m
+        self._moved = np.array(list(itertools.product((False, True), repeat=4)))
+        self._cost = self._moved @ np.array([tuning.slide_cost, tuning.turn_cost] * 2)
+        length = tuning.unknown_arm_length_m if arm_length_m is None else tuning.arm_length_m
+        slides = [np.array(tuning.slide_m) ** 2, np.full(2, tuning.calibrated_m**2), np.full(2, tuning.exact_m**2)]
+        turns = [np.array(tuning.turn_rad) ** 2, np.full(2, tuning.calibrated_rad**2), np.full(2, tuning.exact_rad**2)]
+        moved, tolerance, exact = (
+            np.concatenate((np.repeat(np.column_stack((s, t)).ravel(), 3), (length**2,)))
+            for s, t in zip(slides, turns, strict=True)
+        )
+        spread = np.concatenate((np.repeat(self._moved, 3, axis=1), np.ones((16, 1), dtype=bool)), axis=1)
+        self._test = np.where(spread, moved, tolerance)
+        self._prior = np.where(spread, moved, exact)
+        self._explained: _Explained | None = None
+
+    def judge(self, belief: Belief) -> Posture:
+        """Return the bones as the mean over the answers, with the covariance of the mixture."""
+        explained = self._explanations(belief)
+        found = np.concatenate(belief.gh_in_marker) - explained.expected
+        P_gg = belief.P[BOTH_GH, BOTH_GH]
+        S = P_gg + explained.test
+        distance = np.linalg.solve(S, np.broadcast_to(found[:, None], (16, 6, 1)))[:, :, 0] @ found
+        cost = distance + np.linalg.slogdet(S)[1] + self._cost
+        odds = np.exp(-0.5 * (cost - cost.min()))
+        odds[odds < _NEGLIGIBLE] = 0.0
+        weights = odds / odds.sum()
+        kept = np.flatnonzero(weights)
+        means, covariances = zip(*(self._posture(belief, explained, int(h), found) for h in kept), strict=True)
+        mean = np.sum([weights[h] * m for h, m in zip(kept, means, strict=True)], axis=0)
+        covariance = np.zeros((_POSTURE + DRIFT_SIZE, _POSTURE + DRIFT_SIZE))
+        for h, m, part in zip(kept, means, covariances, strict=True):
+            apart = m - mean
+            covariance += weights[h] * (part + np.outer(apart, apart))
+        drifted = [float(weights[self._moved[:, 2 * k] | self._moved[:, 2 * k + 1]].sum()) for k in (0, 1)]
+        return self._compose(belief, explained, mean, covariance, (drifted[0], drifted[1]))
+
+    def _explanations(self, belief: Belief) -> "_Explained":
+        """Return what each answer expects of the GH centre in the markers; kept while arm length and jumps stay as they are."""
+        R, c = self._m1_from_elw[:3, :3], self._m1_from_elw[:3, 3]
+        along = R[:, 1]
+        length = self._arm_length_m
+        if length is None:
+            length = float(along @ (belief.base[1].slide + belief.base[1].turn @ belief.gh_in_marker[1] - c))
+        known = self._explained
+        if known is None or known.base is not belief.base or abs(known.length_m - length) > _LENGTH_STEP_M:
+            known = self._explain(belief, length)
+            self._explained = known
+        return known
+
+    def _explain(self, belief: Belief, length_m: float) -> "_Explained":
+        along = self._m1_from_elw[:3, 1]
+        nominal = (self._m0_from_gh[:3, 3], self._m1_from_elw[:3, 3] + length_m * along)
+        G = np.zeros((6, DRIFT_SIZE))
+        expected = np.empty(6)
+        variance = np.zeros(DRIFT_SIZE)
+        for k, base in enumerate(belief.base):
+            rows = slice(3 * k, 3 * k + 3)
+            there = base.turn.T @ (nominal[k] - base.slide)
+            expected[rows] = there
+            G[rows, SLIDE[k]] = -base.turn.T
+            G[rows, TURN[k]] = skew(there)
+            variance[SLIDE[k]], variance[TURN[k]] = base.slide_variance, base.turn_variance
+        G[3:, LENGTH] = belief.base[1].turn.T @ along
+        test, prior = self._test + variance, self._prior + variance
+        spread = np.einsum("ij,hj,kj->hik", G, prior, G)
+        W = np.swapaxes(np.linalg.solve(spread, G * prior[:, None, :]), 1, 2)
+        rest = np.einsum("hj,jk->hjk", prior, np.eye(DRIFT_SIZE)) - W @ (G * prior[:, None, :])
+        return _Explained(belief.base, length_m, expected, np.einsum("ij,hj,kj->hik", G, test, G), spread, W, rest)
+
+    def _posture(self, belief: Belief, explained: "_Explained", h: int, found: Array) -> tuple[Array, Array]:
+        """Return the (22,) shift and (22, 22) covariance of the posture if answer `h` is the right one."""
+        columns = belief.P[_ROWS, BOTH_GH]
+        gain = np.linalg.solve(columns[9:] + explained.spread[h], columns.T).T
+        shift = -(gain @ found)
+        P = belief.P[np.ix_(_ROWS, _ROWS)] - gain @ columns.T
+        W = explained.W[h]
+        m0, m1 = belief.e_from_marker
+        # Errors of the posture from those of the poses and of the GH centre in the markers, and from what W leaves open.
+        B, M = np.zeros((_POSTURE + DRIFT_SIZE, 15)), np.zeros((_POSTURE + DRIFT_SIZE, DRIFT_SIZE))
+        B[POSES, POSES] = np.eye(9)
+        M[ACROMION, TURN[0]], M[ARM, TURN[1]] = -m0, -m1
+        M[_POSTURE:] = np.eye(DRIFT_SIZE)
+        B[:, 9:] = M @ W
+        drift = W @ (found + shift[9:])
+        mean = M @ drift
+        mean[POSES] += shift[POSES]
+        return mean, B @ P @ B.T + M @ explained.rest[h] @ M.T
+
+    def _compose(
+        self, belief: Belief, explained: "_Explained", mean: Array, covariance: Array, drifted: tuple[float, float]
+    ) -> Posture:
+        drift = mean[_POSTURE:]
+        m0, m1 = (R @ base.turn.T for R, base in zip(belief.e_from_marker, belief.base, strict=True))
+        e_from_gh, e_from_elw = np.eye(4), np.eye(4)
+        e_from_gh[:3, :3] = turned(mean[ACROMION], m0 @ self._m0_from_gh[:3, :3])
+        e_from_gh[:3, 3] = belief.p_gh + mean[GH]
+        e_from_elw[:3, :3] = turned(mean[ARM], m1 @ self._m1_from_elw[:3, :3])
+        e_from_elw[:3, 3] = e_from_gh[:3, 3] - (explained.length_m + float(drift[LENGTH])) * e_from_elw[:3, 1]
+        slides = [base.slide + drift[SLIDE[k]] for k, base in enumerate(belief.base)]
+        turns = [base.turn @ exp_so3(drift[TURN[k]]) for k, base in enumerate(belief.base)]
+        jumped = [1.0 if base.jumped else p for base, p in zip(belief.base, drifted, strict=True)]
+        return Posture(e_from_gh, e_from_elw, covariance, (slides[0], slides[1]), (turns[0], turns[1]), (jumped[0], jumped[1]))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Explained:
+    """What the answers expect.
+
+    Attributes:
+        base: The jumps it was made for.
+        length_m: The arm length it was made for.
+        expected: (6,) GH centre in m0 and in m1 if nothing has drifted.
+        test: (16, 6, 6) how far from there it may be found, for weighing the answers.
+        spread: (16, 6, 6) the same for making use of them.
+        W: (16, 13, 6) drift from the GH centre's deviation.
+        rest: (16, 13, 13) covariance of the drift that this leaves.
+    """
+
+    base: object
+    length_m: float
+    expected: Array
+    test: Array
+    spread: Array
+    W: Array
+    rest: Array

@@ -1,0 +1,227 @@
+"""The fused way: a filter over both markers and the encoders, its belief carried to the instant asked for."""
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+from ghest_drivers.samples import EncoderSample
+from ghest_rt.estimation.arm import eq10_m0_from_arm, gh_from_arm_rotation, step3_4_5_e_from_arm
+from ghest_rt.estimation.arm_chain import CAMERAS, ArmChain, lost
+from ghest_rt.estimation.fused.belief import ACROMION, ARM, Belief
+from ghest_rt.estimation.fused.drift import DRIFT_SIZE, SLIDE, TURN, DriftJudge, Posture
+from ghest_rt.estimation.fused.filter import FusedFilter
+from ghest_rt.estimation.fused.joints import JointForecast, Joints
+from ghest_rt.estimation.fused.process import Process
+from ghest_rt.estimation.fused.sighting import Sighting
+from ghest_rt.estimation.fused.timeline import Timeline
+from ghest_rt.estimation.fused.tuning import Tuning
+from ghest_rt.estimation.inputs import NO_FRAMES, NOT_SEEN, Inputs
+from ghest_rt.estimation.reasons import gravest
+from ghest_rt.estimation.uncertainty import covariance_in_e, euler_sigma_rad
+from ghest_rt.geometry.se3 import inverse
+from ghest_rt.geometry.so3 import Array, log_so3
+from ghest_rt.messages.results import DriftReport, GhEstimate, MarkerDrift, MarkerObservation, MarkerStatus, Reason, Status
+from ghest_rt.sync.encoder_track import EncoderTrack
+
+# Both markers must have been seen within this time for the filter to start.
+_START_NS = 100_000_000
+# Encoder samples farther apart than this are a gap: no known link is slower than 40 Hz.
+_ENCODER_BRIDGE_NS = 40_000_000
+# A camera's latency is followed by a tenth per frame.
+_FOLLOW = 0.1
+# Nothing is bridged for longer, however certain it looks.
+_LONGEST_BRIDGE_NS = 3_000_000_000
+# A marker has drifted if that is likelier than not.
+_FLAG = 0.5
+# Frames come this much later than usual now and then.
+_JITTER_NS = 8_000_000
+
+
+class FusedEstimator:
+    """Sections 3.3.2 to 3.3.5 as one estimation problem; an instant asked for may lie after everything that has arrived."""
+
+    def __init__(
+        self,
+        chain: ArmChain,
+        max_gap_ns: int,
+        period_ns: Mapping[str, int],
+        *,
+        arm_length_m: float | None = None,
+        tuning: Tuning | None = None,
+    ) -> None:
+        """Start without samples.
+
+        Args:
+            chain: The station's geometry and calibration.
+            max_gap_ns: The longest silence of the encoders that is bridged.
+            period_ns: Nominal frame period of each camera.
+            arm_length_m: Calibrated distance from elbow to GH centre, if known.
+            tuning: Takes the place of the noise and priors.
+        """
+        self._chain = chain
+        self._tuning = tuning or Tuning()
+        self._filter = FusedFilter(self._tuning, Process(self._tuning, chain.m1_from_elw[:3, 3]))
+        self._judge = DriftJudge(self._tuning, chain.m0_from_gh, chain.m1_from_elw, arm_length_m)
+        self._inputs = Inputs(EncoderTrack(chain.limits), CAMERAS, max_gap_ns)
+        self._joints = JointForecast(self._inputs.encoders, max_gap_ns)
+        self._patience_ns = [8 * period_ns[camera] // 5 for camera in CAMERAS]
+        self._latency_ns: list[float] = [0.0, 0.0]
+        self._last: list[Sighting | None] = [None, None]
+        self._timeline: Timeline | None = None
+        self._default = np.diag(np.repeat((self._tuning.default_rotation_rad**2, self._tuning.default_position_m**2), 3))
+        self._floor = np.diag(np.repeat((self._tuning.rotation_floor_rad**2, self._tuning.position_floor_m**2), 3))
+
+    def add_encoder(self, sample: EncoderSample) -> None:
+        """Take an encoder sample."""
+        if self._inputs.add_encoder(sample):
+            self._joints.add(sample)
+
+    def add_marker(self, observation: MarkerObservation) -> None:
+        """Take what became of a marker in a frame; one with a pose teaches the filter at its capture time."""
+        if not self._inputs.add_frame(observation) or observation.camera_from_marker is None:
+            return
+        which = CAMERAS.index(observation.camera)
+        latency_ns = observation.t_arrival_ns - observation.t_capture_ns
+        known = self._latency_ns[which]
+        self._latency_ns[which] = known + _FOLLOW * (latency_ns - known) if self._last[which] else float(latency_ns)
+        sighting = self._sighting(observation, which)
+        if sighting is None:
+            return
+        self._last[which] = sighting
+        if self._timeline is None:
+            self._start()
+        else:
+            self._timeline.add(sighting)
+
+    def counts(self) -> dict[str, int]:
+        """Return how many samples were not used, by reason."""
+        taken = {} if self._timeline is None else dict(self._timeline.counts)
+        return {**self._inputs.counts(), **taken}
+
+    def estimate(self, t_ns: int) -> GhEstimate:
+        """Return the GH joint at `t_ns`, forecast where nothing newer has come, or why there is none."""
+        joints = self._joints.at(t_ns)
+        known = None if self._timeline is None else self._timeline.belief_at(t_ns)
+        if known is None or joints is None:
+            return lost(t_ns, self._why_nothing(t_ns), self._inputs.newest_ns)
+        belief = known.copy()
+        self._filter.process.advance(belief, t_ns, self._e_from_r1(joints))
+        stale = self._stale(belief, t_ns)
+        posture = self._judge.judge(belief)
+        e_from_arm = step3_4_5_e_from_arm(posture.e_from_gh, posture.e_from_elw)
+        covariance = _rotation_covariance(posture)
+        newest_ns = {**self._inputs.newest_ns, "r0": belief.seen_ns[0], "r1": belief.seen_ns[1], "encoders": joints.newest_ns}
+        if e_from_arm is None or (stale and self._given_up(belief, t_ns, covariance)):
+            return lost(t_ns, self._why_unseen(stale, t_ns) if stale else Reason.UNCERTAIN, newest_ns)
+        m0_from_gh = self._chain.m0_from_gh
+        m0_from_arm = eq10_m0_from_arm(posture.e_from_gh @ inverse(m0_from_gh), e_from_arm)
+        gh_from_arm = gh_from_arm_rotation(m0_from_gh, m0_from_arm)
+        drift = _report(posture)
+        reason = self._weakness(gh_from_arm, covariance, bool(stale) or joints.gap_ns > _ENCODER_BRIDGE_NS, drift)
+        return GhEstimate(
+            t_sample_ns=t_ns,
+            status=Status.VALID if reason is Reason.NONE else Status.DEGRADED,
+            reason=reason,
+            gh_from_arm=gh_from_arm,
+            m0_from_arm=m0_from_arm,
+            e_from_m0=belief.e_from(0),
+            e_from_m1=belief.e_from(1),
+            covariance=covariance,
+            newest_ns=newest_ns,
+            drift=drift,
+        )
+
+    def _sighting(self, observation: MarkerObservation, which: int) -> Sighting | None:
+        joints = self._joints.at(observation.t_capture_ns)
+        if joints is None or observation.camera_from_marker is None:
+            return None
+        e_from_r1 = self._e_from_r1(joints)
+        e_from_camera = e_from_r1 if which else self._chain.e_from_camera(CAMERAS[0], joints.positions)
+        covariance = self._default if observation.covariance is None else observation.covariance + self._floor
+        covariance = covariance_in_e(covariance, e_from_camera)
+        if self._chain.needs_encoders(observation.camera):
+            spread_m = self._tuning.encoder_m + self._tuning.forecast_m_s3 * (joints.ahead_ns * 1e-9) ** 3
+            covariance[[0, 1, 2], [0, 1, 2]] += (self._tuning.encoder_rad * spread_m / self._tuning.encoder_m) ** 2
+            covariance[[3, 4, 5], [3, 4, 5]] += spread_m**2
+        return Sighting(
+            marker=which,
+            t_ns=observation.t_capture_ns,
+            pose=e_from_camera @ observation.camera_from_marker,
+            covariance=covariance,
+            e_from_r1=e_from_r1,
+            color_only=observation.status is MarkerStatus.COLOR_ONLY,
+            fewer_disks=0 < observation.disks_used < 4,
+        )
+
+    def _start(self) -> None:
+        m0, m1 = self._last
+        if m0 is not None and m1 is not None and abs(m0.t_ns - m1.t_ns) <= _START_NS:
+            self._timeline = Timeline(self._filter, self._filter.start(m0, m1, self._chain.m0_from_gh))
+
+    def _e_from_r1(self, joints: Joints) -> Array:
+        return self._chain.e_from_camera(CAMERAS[1], joints.positions)
+
+    def _stale(self, belief: Belief, t_ns: int) -> tuple[int, ...]:
+        """Return the markers whose newest sighting is older than latency and frame rate account for."""
+        return tuple(
+            which
+            for which in (0, 1)
+            if t_ns - belief.seen_ns[which] > self._latency_ns[which] + self._patience_ns[which] + _JITTER_NS
+        )
+
+    def _given_up(self, belief: Belief, t_ns: int, covariance: Array) -> bool:
+        too_long = t_ns - min(belief.seen_ns) > _LONGEST_BRIDGE_NS
+        return too_long or math.sqrt(float(np.linalg.eigvalsh(covariance)[-1])) > self._chain.sigma_limit_rad
+
+    def _why_unseen(self, stale: tuple[int, ...], t_ns: int) -> Reason:
+        reasons = []
+        for which in stale:
+            newest = self._inputs.frames[CAMERAS[which]].before(t_ns)
+            unseen = newest is not None and newest[1].camera_from_marker is None and t_ns - newest[0] <= _START_NS
+            reasons.append((NOT_SEEN if unseen else NO_FRAMES)[CAMERAS[which]])
+        return gravest(*reasons)
+
+    def _why_nothing(self, t_ns: int) -> Reason:
+        without_joints = self._inputs.why_no_joints(t_ns) if self._joints.at(t_ns) is None else None
+        if without_joints is not None:
+            return without_joints
+        missing = [camera for camera, sighting in zip(CAMERAS, self._last, strict=True) if sighting is None]
+        reasons = [self._inputs.why_no_pose(camera, t_ns, needs_encoders=False) for camera in missing]
+        return gravest(*reasons, Reason.STARTING) if reasons else Reason.STARTING
+
+    def _weakness(self, gh_from_arm: Array, covariance: Array, bridged: bool, drift: DriftReport) -> Reason:
+        """Return the gravest reason why angles that are there are not plainly valid."""
+        if max(euler_sigma_rad(gh_from_arm, covariance)) > self._chain.sigma_limit_rad:
+            return Reason.UNCERTAIN
+        last = [sighting for sighting in self._last if sighting is not None]
+        if any(sighting.color_only for sighting in last):
+            return Reason.COLOR_ONLY
+        if any(sighting.fewer_disks for sighting in last):
+            return Reason.FEWER_DISKS
+        if bridged:
+            return Reason.BRIDGED
+        return Reason.MARKER_DRIFT if drift.m0.flagged or drift.m1.flagged else Reason.NONE
+
+
+def _report(posture: Posture) -> DriftReport:
+    sigma = np.sqrt(posture.covariance.diagonal()[-DRIFT_SIZE:])
+    m0, m1 = (
+        MarkerDrift(
+            flagged=posture.drifted[k] > _FLAG,
+            probability=posture.drifted[k],
+            slide_m=posture.slide[k],
+            slide_sigma_m=sigma[SLIDE[k]],
+            turn_rad=log_so3(posture.turn[k]),
+            turn_sigma_rad=sigma[TURN[k]],
+        )
+        for k in (0, 1)
+    )
+    return DriftReport(m0, m1)
+
+
+def _rotation_covariance(posture: Posture) -> Array:
+    """Return the (3, 3) covariance of the error of gh_from_arm: epsilon = gh_from_e (phi_humerus - phi_scapula)."""
+    P, gh_from_e = posture.covariance, posture.e_from_gh[:3, :3].T
+    cross = P[ACROMION, ARM]
+    return np.asarray(gh_from_e @ (P[ACROMION, ACROMION] + P[ARM, ARM] - cross - cross.T) @ gh_from_e.T)

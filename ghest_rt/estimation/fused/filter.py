@@ -1,0 +1,210 @@
+"""One measurement after the other into the belief: gate, update, agility, jumps; sections 3 to 5 of docs/fused-estimator.md."""
+
+import math
+from enum import StrEnum
+from typing import TypeVar
+
+import numpy as np
+
+from ghest_rt.estimation.fused.belief import (
+    ACROMION,
+    ACROMION_RATE,
+    ARM,
+    ARM_RATE,
+    BOTH_GH,
+    GH,
+    GH_IN_MARKER,
+    GH_RATE,
+    RATES,
+    SIZE,
+    Base,
+    Belief,
+    Streak,
+)
+from ghest_rt.estimation.fused.measurement import Innovation, innovation_of
+from ghest_rt.estimation.fused.process import Process
+from ghest_rt.estimation.fused.sighting import Sighting
+from ghest_rt.estimation.fused.tuning import Tuning
+from ghest_rt.geometry.so3 import Array
+
+# Two outliers that differ by less than this show the same new place of a marker.
+_SAME_RAD = math.radians(1.0)
+_SAME_M = 0.003
+# Normalised innovations squared, per degree of freedom, above this are more than noise.
+_USUAL_NIS = 1.5
+# Standard deviations of a belief before the first pair of sightings.
+_UNKNOWN_RAD, _UNKNOWN_M, _UNKNOWN_RAD_S, _UNKNOWN_M_S = 0.5, 0.2, 1.0, 0.3
+
+_POSITION = np.arange(3, 6)
+
+_Item = TypeVar("_Item")
+
+
+class Outcome(StrEnum):
+    """What became of a measurement."""
+
+    TAKEN = "taken"
+    OUTLIER = "outlier"  # too far from what was foretold
+    JUMP = "jump"  # taken: the marker has moved on its bone
+    REGAINED = "regained"  # taken after many outliers unlike each other: the body has moved as nothing foretold
+
+
+class FusedFilter:
+    """The error-state Kalman filter; holds no state of its own."""
+
+    def __init__(self, tuning: Tuning, process: Process) -> None:
+        """Prepare."""
+        self.process = process
+        self._tuning = tuning
+        self._surge = _surges(tuning)
+
+    def start(self, m0: Sighting, m1: Sighting, m0_from_gh: Array) -> Belief:
+        """Return a belief from one sighting of each marker, at the later one's time.
+
+        Args:
+            m0: A sighting of marker m0.
+            m1: One of marker m1, taken about then.
+            m0_from_gh: (4, 4) GH joint frame in the m0 frame, by calibration.
+        """
+        newer = m0 if m0.t_ns > m1.t_ns else m1
+        variance = np.empty(SIZE)
+        variance[ACROMION] = variance[ARM] = _UNKNOWN_RAD**2
+        variance[GH] = _UNKNOWN_M**2
+        variance[RATES] = np.repeat((_UNKNOWN_RAD_S**2, _UNKNOWN_M_S**2, _UNKNOWN_RAD_S**2), 3)
+        variance[BOTH_GH] = self._tuning.unknown_gh_m**2
+        p_gh = (m0.pose @ m0_from_gh)[:3, 3]
+        belief = Belief(
+            t_ns=newer.t_ns,
+            e_from_r1=newer.e_from_r1,
+            e_from_marker=(m0.pose[:3, :3], m1.pose[:3, :3]),
+            p_gh=p_gh,
+            rates=np.zeros(9),
+            gh_in_marker=(m0_from_gh[:3, 3], m1.pose[:3, :3].T @ (p_gh - m1.pose[:3, 3])),
+            P=np.diag(variance),
+            agility=(self._tuning.starting_agility, self._tuning.starting_agility),
+            seen_ns=(m0.t_ns, m1.t_ns),
+        )
+        for sighting in (m0, m1):
+            _correct(belief, _Update(belief.P, innovation_of(belief, sighting.marker, sighting.pose), sighting.covariance))
+        return belief
+
+    def take(self, belief: Belief, sighting: Sighting) -> Outcome:
+        """Move a belief on to a sighting's time and let it learn from the sighting; say what became of it."""
+        self.process.advance(belief, sighting.t_ns, sighting.e_from_r1)
+        which = sighting.marker
+        innovation = innovation_of(belief, which, sighting.pose)
+        update = _Update(belief.P, innovation, sighting.covariance)
+        outcome = Outcome.TAKEN
+        if not update.nis <= self._tuning.gate:
+            surged = belief.P + self._surge[which]
+            update = _Update(surged, innovation, sighting.covariance)
+            if not update.nis <= self._tuning.gate:
+                streak = _streak(belief.streaks[which], sighting.t_ns, innovation.residual)
+                belief.streaks = _with(belief.streaks, which, streak)
+                if self._has_jumped(streak, sighting.t_ns):
+                    outcome = Outcome.JUMP
+                    moved = _moved_base(belief, which, sighting.pose, update.spread)
+                    belief.base = _with(belief.base, which, moved)
+                elif streak.length >= self._tuning.regain_count:
+                    outcome = Outcome.REGAINED
+                else:
+                    return Outcome.OUTLIER
+                freed = self._freed(surged, which, everything=outcome is Outcome.JUMP)
+                update = _Update(freed, innovation, sighting.covariance)
+        _correct(belief, update)
+        self._adapt(belief, which, update)
+        belief.streaks = _with(belief.streaks, which, Streak())
+        belief.seen_ns = _with(belief.seen_ns, which, sighting.t_ns)
+        return outcome
+
+    def _adapt(self, belief: Belief, which: int, update: "_Update") -> None:
+        """Let the agility of a marker's body follow the innovations: alike in a row means that the belief lags behind."""
+        tuning = self._tuning
+        turn = update.surprise[:3]
+        alike = float(turn @ belief.surprise[which]) / 3.0
+        excess = max(float(turn @ turn) / 3.0 - _USUAL_NIS, 0.0)
+        push = tuning.agility_gain * (min(max(alike, -1.0), 3.0) + min(excess, 3.0) - tuning.agility_rest)
+        agility = min(max(belief.agility[which] * math.exp(push), tuning.least_agility), tuning.most_agility)
+        belief.agility = _with(belief.agility, which, agility)
+        belief.surprise = _with(belief.surprise, which, turn)
+
+    def _has_jumped(self, streak: Streak, t_ns: int) -> bool:
+        return streak.count >= self._tuning.jump_count and t_ns - streak.since_ns >= self._tuning.jump_span_ns
+
+    def _freed(self, P: Array, which: int, *, everything: bool) -> Array:
+        """Return P for a marker whose orientation is open; with `everything`, also the GH centre in it; else its rates."""
+        spans = [((ACROMION, ARM)[which], _UNKNOWN_RAD)]
+        if everything:
+            spans.append((GH_IN_MARKER[which], self._tuning.unknown_gh_m))
+        else:
+            spans.append(((ACROMION_RATE, ARM_RATE)[which], _UNKNOWN_RAD_S))
+            spans += [(GH, _UNKNOWN_M), (GH_RATE, _UNKNOWN_M_S)] if which == 0 else []
+        freed = P.copy()
+        for part, sigma in spans:
+            freed[part] = 0.0
+            freed[:, part] = 0.0
+            freed[part, part] = sigma**2 * np.eye(3)
+        return freed
+
+
+class _Update:
+    """The Kalman update in square-root form of the innovation: S = L L', Y = L^-1 H P, surprise = L^-1 residual."""
+
+    def __init__(self, P: Array, innovation: Innovation, R: Array) -> None:
+        H_P = innovation.H @ P
+        S = H_P @ innovation.H.T + R
+        S[_POSITION, _POSITION] += innovation.bend_m2
+        solved = np.linalg.solve(np.linalg.cholesky(S), np.column_stack((H_P, innovation.residual)))
+        self.P = P
+        self.spread = S
+        self.Y = solved[:, :-1]
+        self.surprise = solved[:, -1]
+        self.nis = float(self.surprise @ self.surprise)
+
+
+def _correct(belief: Belief, update: _Update) -> None:
+    belief.P = update.P - update.Y.T @ update.Y
+    belief.shift(update.surprise @ update.Y)
+
+
+def _streak(streak: Streak, t_ns: int, residual: Array) -> Streak:
+    apart = residual - streak.residual
+    if streak.count and np.linalg.norm(apart[:3]) < _SAME_RAD and np.linalg.norm(apart[3:]) < _SAME_M:
+        return Streak(streak.count + 1, streak.since_ns, streak.length + 1, residual)
+    return Streak(1, t_ns, streak.length + 1, residual)
+
+
+def _moved_base(belief: Belief, which: int, pose: Array, spread: Array) -> Base:
+    """Return how a marker sits on its bone, now that it is seen at `pose` and the bone has gone on as foretold.
+
+    Args:
+        belief: At the sighting's time.
+        which: The marker.
+        pose: (4, 4) of the marker in E, measured.
+        spread: (6, 6) covariance of what is measured against what was foretold.
+    """
+    base = belief.base[which]
+    R = belief.e_from_marker[which]
+    p = belief.p_gh - R @ belief.gh_in_marker[which]
+    return Base(
+        slide=base.slide + base.turn @ (R.T @ (pose[:3, 3] - p)),
+        turn=base.turn @ R.T @ pose[:3, :3],
+        slide_variance=base.slide_variance + float(np.trace(spread[3:, 3:])) / 3.0,
+        turn_variance=base.turn_variance + float(np.trace(spread[:3, :3])) / 3.0,
+        jumped=True,
+    )
+
+
+def _with(pair: tuple[_Item, _Item], which: int, item: _Item) -> tuple[_Item, _Item]:
+    """Return a pair with one of its items replaced."""
+    return (item, pair[1]) if which == 0 else (pair[0], item)
+
+
+def _surges(tuning: Tuning) -> tuple[Array, Array]:
+    """Return what a movement that no model foresees adds to P, for the body of m0 and of m1."""
+    turn, rate = tuning.surge_rad**2, tuning.surge_rate_rad_s**2
+    acromion, arm = np.zeros(SIZE), np.zeros(SIZE)
+    acromion[ACROMION], acromion[ACROMION_RATE] = turn, rate
+    acromion[GH], acromion[GH_RATE] = tuning.surge_m**2, tuning.surge_rate_m_s**2
+    arm[ARM], arm[ARM_RATE] = turn, rate
+    return np.diag(acromion), np.diag(arm)

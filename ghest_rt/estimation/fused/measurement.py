@@ -1,0 +1,49 @@
+"""What a belief foretells of a marker's pose, and how that depends on the error state; section 3 of docs/fused-estimator.md."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ghest_rt.estimation.fused.belief import ACROMION, ARM, GH, GH_IN_MARKER, SIZE, Belief
+from ghest_rt.geometry.so3 import Array, log_so3, skew
+
+_EYE_3 = np.eye(3)
+_ROTATION = (ACROMION, ARM)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Innovation:
+    """A measurement compared with what was foretold.
+
+    Attributes:
+        residual: (6,) rotation error rad, position error m: measured against foretold, left perturbation, E axes.
+        H: (6, 24) its dependence on the error state.
+        bend_m2: Variance of the position by the product of two errors, which H leaves out: without it, the noise of the
+            rotation would pass for movement, which tells where the GH centre is.
+    """
+
+    residual: Array
+    H: Array
+    bend_m2: float
+
+
+def innovation_of(belief: Belief, marker: int, e_from_marker: Array) -> Innovation:
+    """Compare a measured pose with the belief: R as believed, p = p_gh - R gh_in_marker.
+
+    Args:
+        belief: At the capture time.
+        marker: 0 for m0, 1 for m1.
+        e_from_marker: (4, 4) as measured, equation (7).
+    """
+    R = belief.e_from_marker[marker]
+    lever = R @ belief.gh_in_marker[marker]
+    H = np.zeros((6, SIZE))
+    H[:3, _ROTATION[marker]] = H[3:, GH] = _EYE_3
+    H[3:, _ROTATION[marker]] = skew(lever)
+    H[3:, GH_IN_MARKER[marker]] = -R
+    residual = np.empty(6)
+    residual[:3] = log_so3(e_from_marker[:3, :3] @ R.T)
+    residual[3:] = e_from_marker[:3, 3] - belief.p_gh + lever
+    variance = belief.P.diagonal()
+    bend = float(variance[_ROTATION[marker]].sum() * variance[GH_IN_MARKER[marker]].sum()) / 3.0
+    return Innovation(residual, H, bend)

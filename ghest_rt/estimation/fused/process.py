@@ -1,0 +1,125 @@
+"""How the belief moves on in time; section 2 of docs/fused-estimator.md."""
+
+import math
+
+import numpy as np
+
+from ghest_rt.estimation.fused.belief import ACROMION, ARM, BOTH_GH, GH, GH_IN_MARKER, GH_RATE, POSES, RATES, Belief
+from ghest_rt.estimation.fused.tuning import Tuning
+from ghest_rt.geometry.so3 import Array, exp_so3, quat_wxyz_from_matrix, skew
+
+# A marker not seen for this long is bridged: its body may do what it has not done before.
+_UNSEEN_NS = 80_000_000
+# Keeps the shortest rotation finite between opposite directions, which no forecast joins.
+_LEAST = 1e-6
+_EYE_3 = np.eye(3)
+
+
+class Process:
+    """Rates that decay (Ornstein-Uhlenbeck), an arm that follows the encoders, markers that creep on their bones."""
+
+    def __init__(self, tuning: Tuning, elbow_in_m1: Array) -> None:
+        """Prepare the constants.
+
+        Args:
+            tuning: Noise.
+            elbow_in_m1: (3,) elbow centre in the m1 frame, by calibration.
+        """
+        self._elbow_in_m1 = elbow_in_m1
+        self._memory_s = tuning.rate_memory_s
+        self._bridging = tuning.bridging_agility
+        self._density = np.empty(9)
+        self._density[ACROMION] = self._density[ARM] = tuning.rotation_density
+        self._density[GH] = tuning.position_density
+        self._creep = np.empty(6)
+        for part, creep in zip(GH_IN_MARKER, tuning.creep_m2_s, strict=True):
+            self._creep[part.start - BOTH_GH.start : part.stop - BOTH_GH.start] = creep
+        self._most = tuning.unknown_gh_m**2
+
+    def advance(self, belief: Belief, t_ns: int, e_from_r1: Array) -> None:
+        """Move a belief on to `t_ns`; nothing happens if it is not later.
+
+        Args:
+            belief: Moved on in place.
+            t_ns: The instant.
+            e_from_r1: (4, 4) camera r1 in E at `t_ns`: the encoders' part in the forecast.
+        """
+        dt = (t_ns - belief.t_ns) * 1e-9
+        if dt <= 0.0:
+            return
+        tau = self._memory_s
+        decay = math.exp(-dt / tau)
+        carry = tau * (1.0 - decay)
+        move = carry * belief.rates
+        p_gh = belief.p_gh + move[GH]
+        m0, m1 = belief.e_from_marker
+        upper_arm = m1 @ (belief.gh_in_marker[1] - self._elbow_in_m1)
+        length2 = float(upper_arm @ upper_arm)
+        follow = follow_encoders(belief, upper_arm, p_gh, e_from_r1)
+        belief.e_from_marker = (exp_so3(move[ACROMION]) @ m0, exp_so3(move[ARM]) @ follow @ m1)
+        belief.p_gh = p_gh
+        belief.rates = decay * belief.rates
+        belief.e_from_r1 = e_from_r1
+        P = belief.P
+        P[ARM] = follow @ P[ARM]
+        P[:, ARM] = P[:, ARM] @ follow.T
+        lean = skew((carry / length2) * upper_arm)
+        P[ARM] += lean @ P[GH_RATE]
+        P[:, ARM] += P[:, GH_RATE] @ lean.T
+        P[POSES] += carry * P[RATES]
+        P[:, POSES] += carry * P[:, RATES]
+        P[RATES] *= decay
+        P[:, RATES] *= decay
+        self._disturb(belief, dt, decay, t_ns)
+        belief.t_ns = t_ns
+
+    def _disturb(self, belief: Belief, dt: float, decay: float, t_ns: int) -> None:
+        """Add the process noise: exact for the decaying rates, a random walk for the creep."""
+        tau = self._memory_s
+        fresh = 0.5 * tau * (1.0 - decay * decay)
+        carry = tau * (1.0 - decay)
+        density = self._density * self._agility(belief, t_ns)
+        diagonal = belief.P.ravel()
+        step = belief.P.shape[0] + 1
+        diagonal[0 : 9 * step : step] += tau * tau * (dt - 2.0 * carry + fresh) * density
+        diagonal[9 * step : 18 * step : step] += fresh * density
+        cross = 0.5 * carry * carry * density
+        diagonal[9 : 9 * step : step] += cross
+        diagonal[9 * (step - 1) : 18 * step - 9 : step] += cross
+        creep = diagonal[18 * step :: step]
+        creep += np.where(creep < self._most, dt * self._creep, 0.0)
+
+    def _agility(self, belief: Belief, t_ns: int) -> Array:
+        factors = [
+            max(agility, self._bridging) if t_ns - seen_ns > _UNSEEN_NS else agility
+            for agility, seen_ns in zip(belief.agility, belief.seen_ns, strict=True)
+        ]
+        return np.repeat(factors, (6, 3))
+
+
+def follow_encoders(belief: Belief, upper_arm: Array, p_gh: Array, e_from_r1: Array) -> Array:
+    """Return the (3, 3) rotation of the arm that the encoders tell, E axes.
+
+    The elbow keeps its place in camera r1, and so moves with the exoskeleton: that turns the arm's direction, by the shortest
+    way. About the arm, the humerus turns with r1.
+
+    Args:
+        belief: Before the movement.
+        upper_arm: (3,) from the elbow to the GH centre before it, E axes, m.
+        p_gh: (3,) GH centre after it.
+        e_from_r1: (4, 4) camera r1 after it.
+    """
+    before = belief.e_from_r1
+    moved = e_from_r1[:3, :3] @ before[:3, :3].T
+    p_elbow = moved @ (belief.p_gh - upper_arm - before[:3, 3]) + e_from_r1[:3, 3]
+    V, W = _unit(upper_arm), _unit(p_gh - p_elbow)
+    # Shortest rotation from V to W: I + [c]x + [c]x^2 / (1 + V.W), c = V x W.
+    C = skew(np.array([V[1] * W[2] - V[2] * W[1], V[2] * W[0] - V[0] * W[2], V[0] * W[1] - V[1] * W[0]]))
+    swing = _EYE_3 + C + C @ C / max(1.0 + float(V @ W), _LEAST)
+    q = quat_wxyz_from_matrix(moved)
+    twist = 2.0 * math.atan2(float(q[1:] @ V), float(q[0]))
+    return np.asarray(swing @ exp_so3(twist * V))
+
+
+def _unit(v: Array) -> Array:
+    return v / math.sqrt(max(float(v @ v), _LEAST))

@@ -1,0 +1,63 @@
+"""Sightings in the order of capture, whatever the order of arrival: the filter is wound back for one that comes late."""
+
+from collections import Counter, deque
+from dataclasses import dataclass
+
+from ghest_rt.estimation.fused.belief import Belief
+from ghest_rt.estimation.fused.filter import FusedFilter, Outcome
+from ghest_rt.estimation.fused.sighting import Sighting
+
+_MARKERS = ("m0", "m1")
+# How far back, in sightings, the filter can be wound.
+_DEPTH = 16
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Entry:
+    """A sighting and what was believed before it."""
+
+    sighting: Sighting
+    before: Belief
+
+
+class Timeline:
+    """The belief after every sighting so far, each taken in at its own capture time."""
+
+    def __init__(self, fused: FusedFilter, start: Belief) -> None:
+        """Go on from a belief."""
+        self._filter = fused
+        self._belief = start
+        self._entries: deque[_Entry] = deque(maxlen=_DEPTH)
+        self.counts: Counter[str] = Counter()
+
+    def belief_at(self, t_ns: int) -> Belief | None:
+        """Return what was believed after the last sighting not later than `t_ns`; copy it before moving it on.
+
+        None before all that is remembered.
+        """
+        if self._belief.t_ns <= t_ns:
+            return self._belief
+        return next((entry.before for entry in reversed(self._entries) if entry.before.t_ns <= t_ns), None)
+
+    def add(self, sighting: Sighting) -> None:
+        """Take a sighting in; one older than the filter can be wound back is counted and left aside."""
+        later: list[Sighting] = []
+        entries = self._entries
+        while entries and entries[-1].sighting.t_ns > sighting.t_ns:
+            entry = entries.pop()
+            later.append(entry.sighting)
+            self._belief = entry.before
+        if sighting.t_ns < self._belief.t_ns:
+            self.counts[f"{_MARKERS[sighting.marker]}_too_late"] += 1
+        else:
+            self._take(sighting, again=False)
+        for undone in reversed(later):
+            self._take(undone, again=True)
+
+    def _take(self, sighting: Sighting, *, again: bool) -> None:
+        before = self._belief
+        self._entries.append(_Entry(sighting, before))
+        self._belief = before.copy()
+        outcome = self._filter.take(self._belief, sighting)
+        if outcome is not Outcome.TAKEN and not again:
+            self.counts[f"{_MARKERS[sighting.marker]}_{outcome}"] += 1

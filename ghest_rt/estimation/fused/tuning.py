@@ -1,0 +1,85 @@
+"""What the filter believes before it has seen anything: noise, motion, drift. Sources in docs/fused-estimator.md."""
+
+import math
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tuning:
+    """Noise and priors of the filter; radians, metres, seconds.
+
+    Attributes:
+        rate_memory_s: Rates decay to zero with this time constant.
+        rotation_density: Spectral density of rotational acceleration at agility 1, rad^2/s^3.
+        position_density: The same of the GH centre, m^2/s^3.
+        least_agility: The agility that remains at rest.
+        starting_agility: The agility before anything is known.
+        most_agility: The greatest agility, during movement that the model does not foresee.
+        bridging_agility: The least agility while a marker is not seen: what its body does then is not known.
+        agility_gain: How fast the agility follows the innovations.
+        agility_rest: How fast it falls while the innovations are white.
+        rotation_floor_rad: Added to the standard deviation of every measured rotation.
+        position_floor_m: Added to that of every measured position.
+        encoder_m: Standard deviation of a marker's position in E that comes from the encoders.
+        encoder_rad: The same of its rotation.
+        forecast_m_s3: Times the cube of the time the joints are forecast over: what the forecast adds to `encoder_m`.
+        default_rotation_rad: Standard deviation of a measured rotation that comes without covariance.
+        default_position_m: The same of a position.
+        gate: A measurement with a normalised innovation squared above this is an outlier (6 degrees of freedom).
+        surge_rad: A movement no model foresees may turn a body by this much between frames.
+        surge_m: And shift the GH centre by this much.
+        surge_rate_rad_s: And change its rate by this much.
+        surge_rate_m_s: And the GH centre's by this much.
+        jump_count: This many outliers in a row that agree with each other are a marker that has jumped.
+        jump_span_ns: Least time they must span.
+        regain_count: After this many outliers in a row, alike or not, the marker is taken as it is seen.
+        creep_m2_s: How fast the GH centre may creep in the frame of m0 and of m1, m^2/s.
+        unknown_gh_m: Standard deviation of the GH centre in a marker's frame before anything is seen.
+        slide_m: Standard deviation of a slide, if there is one, per axis: m0, m1.
+        turn_rad: The same of a turn.
+        calibrated_m: Slide that is calibration, not drift: the tolerance of the test.
+        calibrated_rad: The same of the turn.
+        exact_m: What is left of a slide where there is no drift.
+        exact_rad: What is left of a turn where there is no drift.
+        slide_cost: Twice the logarithm of the odds against a slide.
+        turn_cost: Twice the logarithm of the odds against a turn.
+        arm_length_m: Standard deviation of a calibrated arm length.
+        unknown_arm_length_m: Prior standard deviation of the arm length where it is not calibrated.
+    """
+
+    rate_memory_s: float = 1.0
+    rotation_density: float = 2e-5
+    position_density: float = 1e-7
+    least_agility: float = 1.0
+    starting_agility: float = 100.0
+    most_agility: float = 1e6
+    bridging_agility: float = 300.0
+    agility_gain: float = 0.2
+    agility_rest: float = 0.15
+    rotation_floor_rad: float = math.radians(0.003)
+    position_floor_m: float = 3e-6
+    encoder_m: float = 5e-5
+    encoder_rad: float = math.radians(0.005)
+    forecast_m_s3: float = 10.0
+    default_rotation_rad: float = math.radians(0.3)
+    default_position_m: float = 5e-4
+    gate: float = 45.0
+    surge_rad: float = 0.01
+    surge_m: float = 0.0015
+    surge_rate_rad_s: float = 1.0
+    surge_rate_m_s: float = 0.1
+    jump_count: int = 4
+    jump_span_ns: int = 40_000_000
+    regain_count: int = 8
+    creep_m2_s: tuple[float, float] = (1e-6, 1e-7)
+    unknown_gh_m: float = 0.04
+    slide_m: tuple[float, float] = (0.02, 0.015)
+    turn_rad: tuple[float, float] = (math.radians(3.0), math.radians(3.0))
+    calibrated_m: float = 1e-3
+    calibrated_rad: float = math.radians(0.3)
+    exact_m: float = 2e-5
+    exact_rad: float = math.radians(0.005)
+    slide_cost: float = 6.0
+    turn_cost: float = 12.0
+    arm_length_m: float = 1e-3
+    unknown_arm_length_m: float = 0.05
