@@ -1,0 +1,1 @@
+"""`ghest-rt doctor`: what is there, what is missing, what to do."""

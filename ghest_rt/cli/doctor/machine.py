@@ -1,0 +1,108 @@
+"""The machine and the installation: Python, extras, permissions, the network port."""
+
+import importlib.metadata
+import importlib.util
+import os
+import platform
+import resource
+import socket
+import sys
+from collections.abc import Iterable, Iterator
+
+from ghest_rt import __version__
+from ghest_rt.cli.doctor.findings import Finding, missing, note, ok
+
+_FIFO_PRIORITY = 10
+_EXTRAS = {
+    "sim": ("mujoco", "mink", "scipy"),
+    "rt": ("uvloop",),
+    "parquet": ("pyarrow",),
+    "realsense": ("pyrealsense2",),
+    "oak": ("depthai",),
+    "serial": ("serial",),
+    "can": ("can", "cantools", "canopen"),
+}
+EXTRA_OF_BACKEND = {
+    "sim": "sim",
+    "realsense": "realsense",
+    "realsense_bag": "realsense",
+    "oak": "oak",
+    "serial": "serial",
+    "can": "can",
+    "can_log": "can",
+    "canopen": "can",
+}
+
+
+def check_machine() -> Iterator[Finding]:
+    """Say what machine this is."""
+    yield ok("ghest-rt", f"{__version__} on Python {platform.python_version()}")
+    system = f"{platform.system()} {platform.release()}, {platform.machine()}, {os.cpu_count()} cores"
+    if sys.platform != "linux":
+        yield note("machine", system, "only Linux is tested")
+    elif (os.cpu_count() or 1) < 2:
+        yield note("machine", system, "two cameras at 60 Hz need two cores")
+    else:
+        yield ok("machine", system)
+
+
+def check_extras(needed: Iterable[str]) -> Iterator[Finding]:
+    """Say which optional parts are installed; those of `needed` must be."""
+    for extra, modules in _EXTRAS.items():
+        absent = [name for name in modules if importlib.util.find_spec(name) is None]
+        check = f"extra {extra}"
+        if not absent:
+            yield ok(check, ", ".join(f"{name} {_version(name)}" for name in modules))
+        elif extra in needed:
+            yield missing(check, f"not installed: {', '.join(absent)}", f"pip install 'ghest-rt[{extra}]'", exit_code=3)
+        else:
+            yield note(check, "not installed", f"pip install 'ghest-rt[{extra}]', if it is wanted")
+
+
+def _version(module: str) -> str:
+    names = importlib.metadata.packages_distributions().get(module)
+    return importlib.metadata.version(names[0]) if names else "installed"
+
+
+def check_real_time() -> Iterator[Finding]:
+    """Say whether the service may be punctual."""
+    remedy = "run it as the systemd unit does (LimitRTPRIO=20, LimitMEMLOCK=infinity), or see limits.conf(5)"
+    if _may_be_real_time():
+        yield ok("real-time priority", "permitted")
+    else:
+        yield note("real-time priority", "not permitted: samples are published up to some milliseconds later", remedy)
+    if resource.getrlimit(resource.RLIMIT_MEMLOCK)[0] == resource.RLIM_INFINITY:
+        yield ok("locked memory", "permitted")
+    else:
+        yield note("locked memory", "not permitted", remedy)
+
+
+def _may_be_real_time() -> bool:
+    before = os.sched_getscheduler(0)
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, os.sched_param(_FIFO_PRIORITY))
+    except OSError:
+        return False
+    os.sched_setscheduler(0, before & ~os.SCHED_RESET_ON_FORK, os.sched_param(0))
+    return True
+
+
+def check_endpoints(endpoints: Iterable[str]) -> Iterator[Finding]:
+    """Say whether Zenoh can listen where it shall."""
+    for endpoint in endpoints:
+        check = f"Zenoh on {endpoint}"
+        protocol, _, rest = endpoint.partition("/")
+        host, _, port = rest.partition("#")[0].partition("?")[0].rpartition(":")
+        if protocol not in ("tcp", "tls") or not port.isdigit():
+            yield note(check, "cannot be looked at from here")
+            continue
+        try:
+            with socket.create_server((host.strip("[]"), int(port)), family=_family(host)):
+                yield ok(check, "free")
+        except OSError as error:
+            remedy = "is another ghest-rt running? Stop it, or choose another endpoint with --listen or publisher.listen"
+            yield missing(check, f"cannot be listened on: {error.strerror or error}", remedy, exit_code=1)
+
+
+def _family(host: str) -> socket.AddressFamily:
+    return socket.AF_INET6 if host.startswith("[") else socket.AF_INET
