@@ -34,7 +34,7 @@ def estimate(path: Path, method: Method | None, out: Path, station_file: Path | 
     with Progress(console=console, disable=not console.is_terminal, transient=True) as progress:
         task = progress.add_task(f"estimating {path.name}", total=max(recording.duration_ns, 1))
         first_ns: int | None = None
-        for seq, sample in enumerate(estimate_events(recording.events(), pipeline)):
+        for seq, sample in enumerate(estimate_events(recording.events(), pipeline, t_0_ns=recording.grid_t_0_ns)):
             first_ns = sample.t_sample_ns if first_ns is None else first_ns
             rows.append(row_of(seq, sample, station.config.station.arm))
             valid += sample.status is Status.VALID

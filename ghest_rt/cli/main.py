@@ -116,6 +116,38 @@ def run(
 
 
 @app.command()
+def record(
+    station: Annotated[Path, typer.Option(metavar="FILE", help="Station file", show_default=False)],
+    out: Annotated[Path, typer.Option(metavar="FOLDER", help="Where the recordings go", show_default=False)],
+    part_mb: Annotated[int, typer.Option("--part-mb", min=1, metavar="MB", help="Begin another file at this size")] = 4000,
+    part_min: Annotated[
+        float, typer.Option("--part-min", min=0.01, metavar="MINUTES", help="Begin another file after this time")
+    ] = 10.0,
+    compress: Annotated[
+        bool, typer.Option("--compress", metavar="", help="Smaller files for more processor time (zstd, without loss)")
+    ] = False,
+    method: _MethodOption = None,
+    listen: _Listen = None,
+    no_publish: _NoPublish = False,
+    duration_s: Annotated[
+        float | None, typer.Option("--duration", metavar="SECONDS", help="Stop after this long", show_default=False)
+    ] = None,
+    movement: Annotated[
+        Movement,
+        typer.Option(help="What the patient of a simulated station does (Table 2)", case_sensitive=False, metavar=_MOVEMENTS),
+    ] = Movement.COMB,
+    seed: Annotated[int, typer.Option(metavar="N", help="Of a simulated station")] = 0,
+    as_json: _Json = False,
+) -> None:
+    """Run the service as `run` does and record everything its devices deliver, without loss."""
+    from ghest_rt.cli.recording import RecordOptions
+    from ghest_rt.cli.run import RunOptions, run_station
+
+    recording = RecordOptions(out, part_mb * 1_000_000, round(part_min * 60e9), compress)
+    run_station(RunOptions(station, method, listen, not no_publish, duration_s, as_json, movement, seed, recording))
+
+
+@app.command()
 def simulate(
     out: Annotated[Path, typer.Option(metavar="FILE", help="Recording to write (.mcap)", show_default=False)],
     movement: Annotated[
@@ -224,6 +256,27 @@ def schema(
     from ghest_rt.cli.schema import show_schemas
 
     show_schemas(out)
+
+
+@app.command()
+def doctor(
+    station: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Station file whose devices shall be there", show_default=False)
+    ] = None,
+    live_s: Annotated[
+        float | None,
+        typer.Option(
+            "--live", metavar="SECONDS", min=0.5, help="Also open the station's devices and measure them", show_default=False
+        ),
+    ] = None,
+    as_json: _Json = False,
+) -> None:
+    """Say what is there, what is missing and what to do: installation, permissions, cameras, encoders, station file."""
+    from ghest_rt.cli.doctor.command import run_doctor
+
+    code = run_doctor(station, live_s, as_json)
+    if code:
+        raise typer.Exit(code)
 
 
 def main() -> None:

@@ -177,7 +177,7 @@ class _Replayer:
 
         with LiveView(self._console, facts, scoreboard) as view:
             counts = publish_all(
-                estimate_events(events(), pipeline),
+                estimate_events(events(), pipeline, t_0_ns=recording.grid_t_0_ns),
                 self._composer(station, facts.method, 0),
                 pipeline.lag_ns,
                 (*outputs, scoreboard, view),

@@ -8,10 +8,12 @@ from rich.console import Console
 from rich.table import Table
 
 from ghest_rt.cli.console import print_json
+from ghest_rt.cli.recording import print_recorded, recorded_document
 from ghest_rt.cli.scoreboard import Scoreboard
 from ghest_rt.messages.published import Lateness
 from ghest_rt.service.contract import ServiceSummary
 from ghest_rt.service.health import SampleCounts
+from ghest_rt.service.recorder_settings import RecorderCounts
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,10 +82,13 @@ def report_of(
     )
 
 
-def print_reports(console: Console, reports: Sequence[RunReport], as_json: bool) -> None:
-    """Print the reports as a table, or as one JSON document on standard output."""
+def print_reports(
+    console: Console, reports: Sequence[RunReport], as_json: bool, recorded: RecorderCounts | None = None
+) -> None:
+    """Print the reports, and what was recorded, as a table or as one JSON document on standard output."""
     if as_json:
-        print_json({"runs": [_document(report) for report in reports]})
+        runs = {"runs": [_document(report) for report in reports]}
+        print_json(runs if recorded is None else {**runs, "recording": recorded_document(recorded)})
         return
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0))
     table.add_column("source", overflow="fold", min_width=10)
@@ -115,6 +120,8 @@ def print_reports(console: Console, reports: Sequence[RunReport], as_json: bool)
     for report in reports:
         if report.skipped_frames:
             console.print(f"{report.source}: {report.skipped_frames} frames skipped, vision was slower than the cameras")
+    if recorded is not None:
+        print_recorded(console, recorded)
 
 
 def _document(report: RunReport) -> dict[str, object]:

@@ -11,12 +11,13 @@ from ghest_rt.cli.extras import need_simulation
 from ghest_rt.cli.live import LiveFacts, LiveView
 from ghest_rt.cli.options import Method, Movement
 from ghest_rt.cli.publishing import Publishing
+from ghest_rt.cli.recording import RecordOptions, live_recording
 from ghest_rt.cli.report import print_reports, report_of
 from ghest_rt.cli.scoreboard import Scoreboard
 from ghest_rt.config.devices import SimBackend
 from ghest_rt.config.load import LoadedStation, load_station
 from ghest_rt.config.station import StationConfig
-from ghest_rt.errors import BadInputError
+from ghest_rt.errors import BadInputError, GhestError
 from ghest_rt.estimation.pipeline import Method as PipelineMethod
 from ghest_rt.estimation.pipeline import Pipeline
 from ghest_rt.service.clocks import ScaledClock
@@ -47,6 +48,7 @@ class RunOptions:
         as_json: The summary as JSON.
         movement: What a simulated patient does.
         seed: Of the simulation.
+        record: Where and how everything is recorded; None for not at all.
     """
 
     station: Path
@@ -57,6 +59,7 @@ class RunOptions:
     as_json: bool
     movement: Movement
     seed: int
+    record: RecordOptions | None = None
 
 
 def run_station(options: RunOptions) -> None:
@@ -75,11 +78,18 @@ def run_station(options: RunOptions) -> None:
     method: PipelineMethod = options.method.value if options.method is not None else config.estimator.method
     cameras, encoders = make_devices(station, clock, world.device_settings if world is not None else {})
     scoreboard = world.scoreboard if world is not None else Scoreboard()
-    with StopSignals() as stop, Publishing(config.publisher, options.listen, options.publish, lossless=False) as publishing:
+    with (
+        StopSignals() as stop,
+        Publishing(config.publisher, options.listen, options.publish, lossless=False) as publishing,
+        live_recording(options.record, station, clock) as recording,
+    ):
         facts = LiveFacts(config.station.id, method, publishing.endpoints, f"ghest/{config.station.id}/gh/angles")
         publisher = publishing.publisher_for(config)
         with LiveView(Console(stderr=True) if options.as_json else Console(), facts, scoreboard) as view:
             outputs: list[Output] = [output for output in (publisher, world) if output is not None]
+            if recording is not None:
+                cameras, encoders = recording.tap(cameras, encoders)
+                outputs.append(recording.output)
             service = Service(
                 settings=ServiceSettings(config.rate_hz, round(config.estimator.lag_ms * 1e6)),
                 cameras=cameras,
@@ -91,8 +101,13 @@ def run_station(options: RunOptions) -> None:
                 outputs=(*outputs, view),
                 clock=clock,
             )
+            if recording is not None:
+                recording.output.attach(service)
             summary = run_service(service, stop, options.duration_s)
-    print_reports(Console(), [report_of(config.station.id, method, summary, scoreboard)], options.as_json)
+    counts = recording.counts() if recording is not None else None
+    print_reports(Console(), [report_of(config.station.id, method, summary, scoreboard)], options.as_json, counts)
+    if counts is not None and counts.failure:
+        raise GhestError(f"the recording is not complete: {counts.failure}")
 
 
 def _refuse_replay(config: StationConfig, path: Path) -> None:

@@ -16,6 +16,7 @@ from ghest_rt.sync.pose_track import EXACT_NS
 _FRAMES_AHEAD = 8
 # A silence longer than this is told for so long, then skipped: a jump of the recording's clock must not become a million rows.
 _SILENCE_NS = 10_000_000_000
+_TAIL_NS = 250_000_000
 _CAME_TOO_LATE = (Reason.R0_NO_FRAMES, Reason.R1_NO_FRAMES, Reason.ENCODERS_SILENT, Reason.STARTING)
 
 
@@ -52,7 +53,12 @@ class _Arrival:
 
 
 def estimate_events(
-    events: Iterable[object], pipeline: OfflinePipeline, *, rate_hz: float | None = None, threads: bool = True
+    events: Iterable[object],
+    pipeline: OfflinePipeline,
+    *,
+    rate_hz: float | None = None,
+    t_0_ns: int | None = None,
+    threads: bool = True,
 ) -> Iterator[GhEstimate]:
     """Yield the estimates on the absolute grid t_k = t_0 + round(k * 1e9 / rate).
 
@@ -64,9 +70,10 @@ def estimate_events(
         events: `RgbdFrame` and `EncoderSample` in the order of arrival; anything else is passed over.
         pipeline: A pipeline that has not been used yet.
         rate_hz: Instants per second; None for the station's.
+        t_0_ns: An instant of the grid to be on instead, that of a live run; instants before the first frames are left out.
         threads: Whether each camera's detector runs in a thread of its own. The results are the same.
     """
-    run = _Run(pipeline, pipeline.rate_hz if rate_hz is None else rate_hz)
+    run = _Run(pipeline, pipeline.rate_hz if rate_hz is None else rate_hz, t_0_ns)
     with ExitStack() as stack:
         workers: dict[str, ThreadPoolExecutor] = {}
         if threads:
@@ -101,19 +108,24 @@ def _observe(pipeline: OfflinePipeline, frame: RgbdFrame, workers: dict[str, Thr
 class _Run:
     """The grid of one off-line run."""
 
-    def __init__(self, pipeline: OfflinePipeline, rate_hz: float) -> None:
+    def __init__(self, pipeline: OfflinePipeline, rate_hz: float, t_0_ns: int | None) -> None:
         self._pipeline = pipeline
+        self._t_0_ns = t_0_ns
         self._rate_hz = rate_hz
         self._grid: Grid | None = None
         self._k = 0
         self._first_frame_ns: dict[str, int] = {}
         self._last_frame_ns = 0
         self._last_arrival_ns = 0
+        self._held: list[GhEstimate] = []
 
     def take(self, arrival: _Arrival) -> Iterator[GhEstimate]:
         """Yield what is due before a sample arrives, then hand the sample on."""
         self._last_arrival_ns = arrival.t_arrival_ns
-        yield from self._due(arrival.t_arrival_ns - self._pipeline.lag_ns)
+        for estimate in self._due(arrival.t_arrival_ns - self._pipeline.lag_ns):
+            self._held.append(estimate)
+            if estimate.t_sample_ns <= self._last_frame_ns or estimate.t_sample_ns - self._held[0].t_sample_ns >= _TAIL_NS:
+                yield from self._release()
         sample = arrival.sample
         if isinstance(sample, EncoderSample):
             self._pipeline.add(sample)
@@ -121,10 +133,13 @@ class _Run:
         observation = sample.result()
         self._pipeline.add(observation)
         self._last_frame_ns = max(self._last_frame_ns, observation.t_capture_ns)
+        yield from self._release()
         if self._grid is None:
             self._first_frame_ns.setdefault(observation.camera, observation.t_capture_ns)
             if len(self._first_frame_ns) == len(self._pipeline.cameras):
-                self._grid = Grid(max(self._first_frame_ns.values()), self._rate_hz)
+                first_ns = max(self._first_frame_ns.values())
+                self._grid = Grid(first_ns if self._t_0_ns is None else self._t_0_ns, self._rate_hz)
+                self._k = self._grid.index_from(first_ns)
 
     def finish(self) -> Iterator[GhEstimate]:
         """Yield the instants that remain when everything has arrived."""
@@ -134,6 +149,11 @@ class _Run:
                 yield replace(estimate, reason=Reason.END_OF_RECORDING)
             else:
                 yield estimate
+
+    def _release(self) -> Iterator[GhEstimate]:
+        """Yield what was held back while it was open whether another frame would come."""
+        yield from self._held
+        self._held.clear()
 
     def _due(self, before_ns: int) -> Iterator[GhEstimate]:
         """Yield the estimates at the grid instants earlier than `before_ns` that have not been yielded yet."""

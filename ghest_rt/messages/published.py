@@ -146,6 +146,8 @@ class EventKind(StrEnum):
     BAD_DATA = "bad_data"
     FRAMES_SKIPPED = "frames_skipped"
     STATUS_CHANGED = "status_changed"
+    RECORDING_DROPS = "recording_drops"  # the disk is slower than the data
+    RECORDING_STOPPED = "recording_stopped"  # the disk is full or gone
     INTERNAL_ERROR = "internal_error"
 
 
@@ -158,7 +160,7 @@ class Event(_Message):
     t_unix_ns: int
     severity: Literal["info", "warning", "error"]
     kind: EventKind
-    source: str = Field(description="Input concerned (r0, r1, encoders), or service")
+    source: str = Field(description="Input concerned (r0, r1, encoders), service, or recorder")
     message: str
 
 

@@ -8,11 +8,17 @@ from google.protobuf.descriptor_pb2 import FileDescriptorSet
 FORMAT_VERSION = "1"
 PROFILE = "ghest"
 FACTS = "ghest"
+GRID = "ghest.grid"
+GRID_T_0_NS = "t_0_ns"
 STATION_ATTACHMENT = "station.toml"
 URDF_ATTACHMENT = "exoskeleton.urdf"
 
 ENCODER_TOPIC = "/encoders/joints"
 TRUTH_TOPIC = "/truth/state"
+# What was published meanwhile; not read back.
+ANGLES_TOPIC = "/gh/angles"
+HEALTH_TOPIC = "/health"
+EVENTS_TOPIC = "/events"
 
 IMAGE_SCHEMA: str = RawImage.DESCRIPTOR.full_name
 CALIBRATION_SCHEMA: str = CameraCalibration.DESCRIPTOR.full_name

@@ -23,6 +23,7 @@ class Recording:
     Attributes:
         path: The file.
         facts: The free facts written with it, and `format`.
+        grid_t_0_ns: An instant of the grid on which angles were published while it was recorded; None if none were.
         station: The station file and URDF it carries.
         camera_infos: By name, for every camera of the station file.
         encoder_joints: The joints measured, in the order of `EncoderSample.angles_rad`.
@@ -37,6 +38,7 @@ class Recording:
         self.path = path
         scan = scan_file(path)
         self.facts = _facts(path, scan)
+        self.grid_t_0_ns = _grid(scan)
         self.station = _station(path, scan)
         try:
             complete_channels(path, scan)
@@ -117,6 +119,11 @@ def _facts(path: Path, scan: Scan) -> dict[str, str]:
             f"{path}: recording format {version!r}, this program reads {layout.FORMAT_VERSION!r}; use the program that wrote it"
         )
     return facts
+
+
+def _grid(scan: Scan) -> int | None:
+    text = scan.metadata.get(layout.GRID, {}).get(layout.GRID_T_0_NS, "")
+    return int(text) if text.isdecimal() and len(text) < 20 else None
 
 
 def _station(path: Path, scan: Scan) -> LoadedStation:

@@ -1,5 +1,6 @@
 """Write recordings (docs/recording-format.md)."""
 
+import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +13,7 @@ from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 from google.protobuf.timestamp_pb2 import Timestamp
 from mcap.writer import CompressionType, Writer
 from numpy.typing import NDArray
+from pydantic import BaseModel
 
 from ghest_drivers.samples import CameraInfo, EncoderSample, Intrinsics, RgbdFrame
 from ghest_rt.config.load import LoadedStation
@@ -20,6 +22,7 @@ from ghest_rt.messages.results import TruthSample
 from ghest_rt.recording import layout, rows
 
 _CHUNK_BYTES = 1_000_000  # what a cut loses at most, beside the message that filled the chunk
+_DATA_FIELD_KEY = bytes([6 << 3 | 2])  # RawImage.data, length-delimited
 _COMPRESSION = {"zstd": CompressionType.ZSTD, "none": CompressionType.NONE}
 
 
@@ -142,6 +145,52 @@ class RecordingWriter:
         channel = self._json_channel(layout.TRUTH_TOPIC, layout.TRUTH_SCHEMA, rows.TruthRow)
         self._put(channel, 0, truth.t_ns, truth.t_ns, rows.truth_to_json(truth))
 
+    def write_published(self, topic: str, message: BaseModel, *, seq: int, t_publish_ns: int, t_ns: int) -> None:
+        """Write a message as it was published, for whoever wants to compare; it is not read back.
+
+        Args:
+            topic: Its topic.
+            message: The message; its class gives the schema.
+            seq: Its number.
+            t_publish_ns: When it was published.
+            t_ns: The instant it holds for.
+        """
+        kind = type(message)
+        schema = self._schema(f"ghest.{kind.__name__}", "jsonschema", lambda: _json_schema(kind))
+        channel = self._channel(topic, "json", schema)
+        self._put(channel, seq, t_publish_ns, t_ns, message.model_dump_json().encode())
+
+    def write_grid(self, t_0_ns: int) -> None:
+        """Write an instant of the grid on which a live run published, so that an off-line run can give the same instants.
+
+        Raises:
+            GhestError: The disk is full or gone.
+        """
+        try:
+            self._writer.add_metadata(layout.GRID, {layout.GRID_T_0_NS: str(t_0_ns)})
+        except OSError as error:
+            raise self._failed(error) from error
+
+    @property
+    def size_bytes(self) -> int:
+        """What has been written to the file so far; the chunk in the making is not."""
+        return self._file.tell()
+
+    def fileno(self) -> int:
+        """Return the file's descriptor, for whoever sees to it that the disk has what was written."""
+        return self._file.fileno()
+
+    def flush(self) -> None:
+        """End the chunk in the making: what was written until now survives the end of this process, however it comes.
+
+        Raises:
+            GhestError: The disk is full or gone.
+        """
+        try:
+            self._writer.flush()  # type: ignore[no-untyped-call]
+        except OSError as error:
+            raise self._failed(error) from error
+
     def close(self) -> None:
         """Write the index and close the file; harmless if done before.
 
@@ -197,16 +246,32 @@ def _check(what: str, image: NDArray[np.generic], shape: tuple[int, ...], dtype:
 
 
 def _image(pixels: NDArray[np.generic], encoding: str, frame_id: str, t_ns: int) -> bytes:
-    message = RawImage(
-        timestamp=_timestamp(t_ns),
-        frame_id=frame_id,
-        width=pixels.shape[1],
-        height=pixels.shape[0],
-        encoding=encoding,
-        step=pixels[0].nbytes,
-        data=pixels.tobytes(),
+    """Serialise a foxglove.RawImage, the pixels put between the other fields here: the library would copy them twice more."""
+    before = RawImage(
+        timestamp=_timestamp(t_ns), width=pixels.shape[1], height=pixels.shape[0], encoding=encoding, step=pixels[0].nbytes
     )
-    return bytes(message.SerializeToString(deterministic=True))
+    data_field = _DATA_FIELD_KEY + _varint(pixels.nbytes)
+    after = RawImage(frame_id=frame_id)
+    parts = (
+        before.SerializeToString(deterministic=True),
+        data_field,
+        np.ascontiguousarray(pixels).data,
+        after.SerializeToString(),
+    )
+    return b"".join(parts)
+
+
+def _varint(value: int) -> bytes:
+    encoded = bytearray()
+    while value > 0x7F:
+        encoded.append(value & 0x7F | 0x80)
+        value >>= 7
+    encoded.append(value)
+    return bytes(encoded)
+
+
+def _json_schema(kind: type[BaseModel]) -> bytes:
+    return json.dumps(kind.model_json_schema(mode="serialization"), sort_keys=True).encode()
 
 
 def _calibration(intrinsics: Intrinsics, frame_id: str, t_ns: int) -> bytes:

@@ -78,6 +78,11 @@ class Service:
         self._health_due_ns = 0
         self._told_status: Status | None = None
 
+    @property
+    def anchor_ns(self) -> int | None:
+        """Instant 0 of the grid of samples; None until every camera has delivered."""
+        return self._anchor_ns
+
     def stop(self) -> None:
         """End the run; call on the event loop's thread."""
         self._stopping.set()

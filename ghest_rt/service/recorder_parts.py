@@ -10,7 +10,7 @@ from ghest_drivers.samples import CameraInfo
 from ghest_rt.config.load import LoadedStation
 from ghest_rt.errors import BadInputError, GhestError
 from ghest_rt.recording.writer import RecordingWriter
-from ghest_rt.service.loop import same_camera
+from ghest_rt.service.camera_worker import same_camera
 from ghest_rt.service.recorder_settings import RecorderSettings
 from ghest_rt.service.recorder_sync import DiskSync
 
@@ -20,8 +20,8 @@ _ALIVE_NS = 500_000_000  # an input that delivered within this time will deliver
 class Parts:
     """Writes to the newest file and begins the next one when that has become large or long enough. For one thread.
 
-    The files are called `<station>-<start, UTC>-<number>.mcap`. A part begins while every input is delivering, so that none lacks
-    a stream: during the outage of an input a part grows beyond its limits.
+    The files are called `<station>-<start, UTC>-<number>.mcap`. A part begins while every input is delivering, so that
+    none lacks a stream: during the outage of an input a part grows beyond its limits.
 
     Args:
         folder: Where the files go; made if it does not exist.
@@ -48,7 +48,9 @@ class Parts:
         try:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            raise BadInputError(f"{folder}: cannot write recordings here: {error.strerror or error}; name another folder") from error
+            raise BadInputError(
+                f"{folder}: cannot write recordings here: {error.strerror or error}; name another folder"
+            ) from error
         start = datetime.fromtimestamp(started_unix_ns * 1e-9, UTC)
         self._stem = folder / f"{station.config.station.id}-{start:%Y%m%dT%H%M%SZ}"
         self._station = station
@@ -59,6 +61,7 @@ class Parts:
         self._newest_ns: dict[str, int] = {}
         self._closed_bytes = 0
         self._closed = False
+        self._grid_t_0_ns: int | None = None
         self._begun_ns = now_ns
         self._flushed_s = time.monotonic()
         self.files: list[Path] = []
@@ -78,6 +81,11 @@ class Parts:
             self.writer.add_camera(info, t_ns)
         elif known is not info and not same_camera(known, info):
             self._rotate(t_ns)
+
+    def set_grid(self, t_0_ns: int) -> None:
+        """Note the grid on which samples are published; for this part and those that follow."""
+        self._grid_t_0_ns = t_0_ns
+        self.writer.write_grid(t_0_ns)
 
     def saw(self, source: str, t_arrival_ns: int) -> None:
         """Note that an input delivers; begins another part if it is time for one."""
@@ -120,6 +128,8 @@ class Parts:
         self.writer = self._next_part()
         for info in self._infos.values():
             self.writer.add_camera(info, t_ns)
+        if self._grid_t_0_ns is not None:
+            self.writer.write_grid(self._grid_t_0_ns)
 
     def _next_part(self) -> RecordingWriter:
         number = len(self.files)

@@ -80,7 +80,7 @@ def run_with_truth(
         yield from _keep_truth(recording.events(), truth)
 
     estimates: list[GhEstimate] = []
-    for estimate in estimate_events(events(), pipeline):
+    for estimate in estimate_events(events(), pipeline, t_0_ns=recording.grid_t_0_ns):
         estimates.append(estimate)
         if progress is not None and len(estimates) % 20 == 0:
             progress(min(1.0, (estimate.t_sample_ns - estimates[0].t_sample_ns) / max(recording.duration_ns, 1)))
