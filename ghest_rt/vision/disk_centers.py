@@ -26,6 +26,7 @@ _AREA_RANGE = (0.8, 1.25)  # measured over predicted area
 _INSIDE_RANGE = (0.6, 1.6)  # mean alpha of the interior by the remembered colour
 _LEAST_INSIDE = 0.2  # share of the radius that counts as interior whatever the band
 _MIN_CONTRAST2 = 0.05**2  # least |disk - plate|^2 used, in units of |plate|^2
+_CLIPPED_SIGMA_PX = 0.02  # what a clipped plate adds
 _MIN_MINOR_PX = 1.8  # a flatter or smaller ellipse has no interior to speak of
 
 
@@ -36,7 +37,7 @@ class DiskCenter:
     Attributes:
         u: Centroid, pixels.
         v: Centroid, pixels.
-        sigma_px: Standard deviation of each coordinate by the image noise found inside the disk.
+        sigma_px: Standard deviation of each coordinate by the image noise found inside the disk, and by clipping.
         radius2_px: Squared geometric mean of the predicted semi-axes.
         relative: Mean colour of the interior, each channel divided by the plate's.
     """
@@ -145,6 +146,8 @@ class DiskMeter:
             # Of the noise, a third is in alpha; it moves the centroid through the band, of area 4 pi r^2 band.
             noise2 = max(scatter[k][0] - b_in * b_in - c_in * c_in, 0.0) / 3.0
             sigma_px = math.sqrt(noise2 * 4.0 * math.pi * radius2 * band * 0.5 * radius2) / area
+            if light.clipped:
+                sigma_px = math.hypot(sigma_px, _CLIPPED_SIGMA_PX)
             relative = _relative(rows[k], (a_in, b_in, c_in), light)
             found.append(DiskCenter(corners[k][0] + sum_u / area, corners[k][1] + sum_v / area, sigma_px, radius2, relative))
         return tuple(found)

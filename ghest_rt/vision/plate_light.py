@@ -11,6 +11,7 @@ from ghest_rt.vision.optics import Optics
 
 _OUTLIER = 0.12  # relative brightness beside the fitted plane
 _MIN_SAMPLES = 8
+_CLIPPED = 251.0
 _MIN_LEVEL = 24.0  # sum of the three channels below which the plate is too dark to be told from anything
 
 
@@ -27,6 +28,11 @@ class PlateLight:
     level: float
     slope: tuple[float, float]
     rgb: tuple[float, float, float]
+
+    @property
+    def clipped(self) -> bool:
+        """Whether the plate is so bright that a channel reaches the end of its scale, where mixtures are no longer linear."""
+        return self.level * max(self.rgb) > _CLIPPED
 
 
 class PlateSampler:

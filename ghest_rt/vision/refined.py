@@ -89,7 +89,7 @@ class RefinedDetector:
             solution = self._track(frame, predicted)
         if solution.fit is None:
             tracked, solution = solution, self._search(frame)
-            if solution.status is MarkerStatus.NOT_FOUND:
+            if solution.status is MarkerStatus.NOT_FOUND and tracked.disks > 0:
                 solution = tracked
         return self._observation(frame, solution)
 

@@ -110,9 +110,10 @@ class Solver:
         if disks < 3:
             return Solution(MarkerStatus.TOO_FEW_DISKS, disks=disks)
         fit = fit_pose(*start, centers, None, _COLD_STEPS)
-        if disks == 4 and fit is not None:
-            other = fit_pose(mirrored(fit.R, fit.p_m), fit.p_m, centers, None, _COLD_STEPS)
-            if other is not None and other.center_chi2 + _TELL_APART_CHI2 < fit.center_chi2:
+        if disks == 4:
+            R, p_m = start
+            other = fit_pose(mirrored(R, p_m), p_m, centers, None, _COLD_STEPS)
+            if other is not None and (fit is None or other.center_chi2 + _TELL_APART_CHI2 < fit.center_chi2):
                 fit = other
         if fit is None or not self._plausible(fit):
             return Solution(MarkerStatus.BAD_FIT, disks=disks)

@@ -63,6 +63,7 @@ class Scene:
     blobs: tuple[Blob, ...] = ()
     depth_pose: np.ndarray | None = None  # pose of the marker at the depth image's time
     textured: bool = True
+    code: int | None = None  # draw this ArUco code of DICT_4X4_50 instead of the disks
     marker: Marker = field(default_factory=lambda: MARKER)
 
 
@@ -97,10 +98,18 @@ def _color(scene, rays):
     on_plate = (np.abs(x) < marker.plate_m / 2) & (np.abs(y) < marker.plate_m / 2) & (z > 0)
     shade = 1.0 + (scene.shading[0] * x + scene.shading[1] * y) / marker.plate_m
     surface = np.where(on_plate[..., None], np.array(PLATE_RGB), rgb)
-    for sign, disk in zip(_SIGNS, marker.disk_rgb, strict=True):
-        cx, cy = sign * marker.half_spacing_m
-        on_disk = on_plate & ((x - cx) ** 2 + (y - cy) ** 2 < marker.disk_radius_m**2)
-        surface[on_disk] = disk
+    if scene.code is None:
+        for sign, disk in zip(_SIGNS, marker.disk_rgb, strict=True):
+            cx, cy = sign * marker.half_spacing_m
+            on_disk = on_plate & ((x - cx) ** 2 + (y - cy) ** 2 < marker.disk_radius_m**2)
+            surface[on_disk] = disk
+    else:
+        cells = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50).generateImageMarker(scene.code, 6)
+        cell_m = (marker.half_spacing_m + marker.disk_radius_m) / 3
+        on_code = on_plate & (np.abs(x) < 3 * cell_m) & (np.abs(y) < 3 * cell_m)
+        column = np.clip(np.floor(x / cell_m + 3), 0, 5).astype(int)
+        row = np.clip(np.floor(3 - y / cell_m), 0, 5).astype(int)  # the code's first row is at +y
+        surface = np.where((on_code & (cells[row, column] == 0))[..., None], 12.0, surface)
     rgb = np.where(on_plate[..., None], surface * shade[..., None], rgb)
     nearest = np.where(on_plate, z, nearest)
     for blob in scene.blobs:
@@ -163,7 +172,7 @@ def render_depth(scene, info, rng):
     return np.clip(np.rint(depth / info.depth_unit_m), 0, 65535).astype(np.uint16)
 
 
-def render(scene, info, rng=None, seq=0, t_ns=0, with_depth=True, t_depth_ns=None, samples=8):
+def render(scene, info, rng=None, *, seq=0, t_ns=0, with_depth=True, t_depth_ns=None, samples=8):
     """One frame of the scene."""
     rng = rng or np.random.default_rng(0)
     color = render_color(scene, info.color, rng, samples)
