@@ -84,6 +84,7 @@ class SupervisedCamera:
             except DeviceLost:
                 self._note_loss()
                 raise
+            _log.info("camera %s: open in process %d", self._name, self._link.pid)
 
     def read(self, timeout_s: float) -> RgbdFrame:
         """See `RgbdCamera.read`."""
