@@ -32,6 +32,10 @@ class ArucoDetector:
         self._detector = cv2.aruco.ArucoDetector(cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50))
         self._distortion = np.array(info.color.distortion)
 
+    def set_parameters(self, parameters: cv2.aruco.DetectorParameters) -> None:
+        """Use other detector parameters than OpenCV's default ones."""
+        self._detector.setDetectorParameters(parameters)
+
     def detect(self, frame: RgbdFrame) -> MarkerObservation:
         """Return the marker's pose, without covariance; status OK, since needing no depth is this method's normal case.
 

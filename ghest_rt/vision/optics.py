@@ -73,20 +73,20 @@ class Optics:
         np.clip(low, 0, (self.width_px - 2, self.height_px - 2), out=low)
         part = centroids_px - low
         fx, fy = part[:, :1], part[:, 1:]
-        u, v = low[:, 0], low[:, 1]
-        maps = self._maps
-        top = maps[v, u] * (1 - fx) + maps[v, u + 1] * fx
-        bottom = maps[v + 1, u] * (1 - fx) + maps[v + 1, u + 1] * fx
-        both: Array = top * (1 - fy) + bottom * fy
+        first = low[:, 1] * self.width_px + low[:, 0]
+        corners = self._maps.take(first[:, None] + (0, 1, self.width_px, self.width_px + 1), axis=0)
+        top = corners[:, 0] * (1 - fx) + corners[:, 1] * fx
+        bottom = corners[:, 2] * (1 - fx) + corners[:, 3] * fx
+        both = top * (1 - fy) + bottom * fy
         return np.asarray(both[:, :2] + radius2_px * both[:, 2:], dtype=np.float64)
 
 
 def _ray_maps(intrinsics: Intrinsics) -> Array:
-    """Return (h, w, 4): the ray of every pixel, and the second-order shift of a unit-radius spot's centroid."""
+    """Return (h * w, 4): the ray of every pixel, and the second-order shift of a unit-radius spot's centroid."""
     rays = ray_grid(intrinsics)
     dv, du = np.gradient(rays, axis=(0, 1))
     laplace = np.gradient(dv, axis=0) + np.gradient(du, axis=1)
     log_det = np.log(np.abs(du[..., 0] * dv[..., 1] - du[..., 1] * dv[..., 0]))
     slope_v, slope_u = np.gradient(log_det)
     shift = laplace / 8.0 + (slope_u[..., None] * du + slope_v[..., None] * dv) / 4.0
-    return np.concatenate([rays, shift], axis=2)
+    return np.concatenate([rays, shift], axis=2).reshape(-1, 4)
