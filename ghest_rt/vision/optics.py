@@ -77,14 +77,14 @@ class Optics:
         corners = self._maps.take(first[:, None] + (0, 1, self.width_px, self.width_px + 1), axis=0)
         top = corners[:, 0] * (1 - fx) + corners[:, 1] * fx
         bottom = corners[:, 2] * (1 - fx) + corners[:, 3] * fx
-        both = top * (1 - fy) + bottom * fy
-        return np.asarray(both[:, :2] + radius2_px * both[:, 2:], dtype=np.float64)
+        both = np.asarray(top * (1 - fy) + bottom * fy, dtype=np.float64)
+        return both[:, :2] + radius2_px * both[:, 2:]
 
 
 def _ray_maps(intrinsics: Intrinsics) -> Array:
     """Return (h * w, 4): the ray of every pixel, and the second-order shift of a unit-radius spot's centroid."""
     rays = ray_grid(intrinsics)
-    dv, du = np.gradient(rays, axis=(0, 1))
+    dv, du = (np.asarray(slope, dtype=np.float64) for slope in np.gradient(rays, axis=(0, 1)))
     laplace = np.gradient(dv, axis=0) + np.gradient(du, axis=1)
     log_det = np.log(np.abs(du[..., 0] * dv[..., 1] - du[..., 1] * dv[..., 0]))
     slope_v, slope_u = np.gradient(log_det)
