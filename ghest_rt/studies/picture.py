@@ -38,14 +38,15 @@ def draw_recording(path: Path, out: Path, method: Method | None = None, progress
     run = run_with_truth(path, method, progress=progress)
     figure = Figure(figsize=(11.0, 8.2), layout="constrained")
     grid = figure.add_gridspec(3, 2, height_ratios=(1.5, 1.1, 0.7))
-    for column, (camera, image) in enumerate(_annotated(run.recording, method).items()):
+    for column, (camera, image) in enumerate(sorted(_annotated(run.recording, method).items())):
         axes = figure.add_subplot(grid[0, column])
         axes.imshow(image, interpolation="nearest")
         marker = run.recording.station.config.cameras[camera].marker
         axes.set_title(f"camera {camera}: marker {marker} with its estimated axes", fontsize=10)
         axes.set_axis_off()
-    _draw_angles(figure.add_subplot(grid[1, :]), run)
-    _draw_error(figure.add_subplot(grid[2, :]), run)
+    angles = figure.add_subplot(grid[1, :])
+    _draw_angles(angles, run)
+    _draw_error(figure.add_subplot(grid[2, :], sharex=angles), run)
     figure.suptitle(f"{path.stem}, method {run.method}", fontsize=12)
     figure.savefig(out, dpi=130)
 
@@ -108,7 +109,8 @@ def _draw_angles(axes: Any, run: JudgedRun) -> None:
         axes.plot(*_columns(true, column), color="0.78", linewidth=4.5, label="truth" if column == len(_COLORS) else None)
         axes.plot(*_columns(estimated, column), color=color, linewidth=1.2, label=name)
     axes.set_ylabel("GH angle (deg)")
-    axes.legend(ncols=4, fontsize=9, loc="upper right")
+    axes.legend(ncols=4, fontsize=9, loc="lower right", bbox_to_anchor=(1.0, 1.0), frameon=False)
+    axes.tick_params(labelbottom=False)
     axes.grid(alpha=0.3)
 
 

@@ -186,3 +186,21 @@ def test_a_detector_that_fails_fails_the_run(make_clinic: Callable[..., Any]) ->
     pipeline.observe = broken  # type: ignore[method-assign]
     with pytest.raises(ValueError, match="wrong size"):
         list(estimate_events(recording(clinic), pipeline))
+
+
+@pytest.mark.parametrize(("outlast_ms", "extra"), [(200, 0), (600, 36)])
+def test_encoders_that_outlast_the_frames_a_little_make_no_instants_of_their_own(
+    make_clinic: Callable[..., Any], outlast_ms: int, extra: int
+) -> None:
+    clinic = make_clinic(1)
+    events = recording(clinic)
+    t_ns = events[-1].t_capture_ns
+    end_ns = Grid(START, 66.6).at(59) + (outlast_ms + 45) * MS
+    while t_ns < end_ns:
+        t_ns += 15_600_000
+        events.append(clinic.encoder(clinic.moving(t_ns), t_ns))
+    found = run(clinic, events)
+    assert [each.status for each in found[:60]] == [Status.VALID] * 60
+    assert abs(len(found) - 60 - extra) <= 4
+    assert {each.status for each in found[60:]} <= {Status.LOST}
+    assert bool(found[60:]) == bool(extra)
