@@ -1,7 +1,8 @@
 """Hardware camera backends for the contract suite: the vendor's own library where it is installed, no device."""
 
 import contextlib
-import importlib.util
+import importlib
+import os
 import sys
 import threading
 from collections.abc import Callable, Iterator
@@ -87,5 +88,10 @@ def supervised_camera(silent: bool) -> Iterator[RgbdCamera]:
 
 
 def installed(library: str) -> bool:
-    """Whether a vendor library is installed."""
-    return importlib.util.find_spec(library) is not None
+    """Whether a vendor library is installed, with the system libraries that it needs."""
+    os.environ.setdefault("DEPTHAI_LEVEL", "error")
+    try:
+        importlib.import_module(library)
+    except ImportError:
+        return False
+    return True
