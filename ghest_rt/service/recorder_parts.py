@@ -14,7 +14,7 @@ from ghest_rt.service.camera_worker import same_camera
 from ghest_rt.service.recorder_settings import RecorderSettings
 from ghest_rt.service.recorder_sync import DiskSync
 
-_ALIVE_NS = 500_000_000  # an input that delivered within this time will deliver into the next part, too
+_ALIVE_NS = 250_000_000  # an input that delivered within this time will deliver into the next part, too
 
 
 class Parts:
@@ -59,6 +59,7 @@ class Parts:
         self._sync = DiskSync(settings.sync_ns * 1e-9)
         self._infos: dict[str, CameraInfo] = {}
         self._newest_ns: dict[str, int] = {}
+        self._waiting: set[str] = set()  # inputs that have not delivered into this part yet
         self._closed_bytes = 0
         self._closed = False
         self._grid_t_0_ns: int | None = None
@@ -91,8 +92,9 @@ class Parts:
         """Note that an input delivers; begins another part if it is time for one."""
         newest = self._newest_ns
         newest[source] = max(t_arrival_ns, newest.get(source, t_arrival_ns))
+        self._waiting.discard(source)
         grown = self.writer.size_bytes >= self._settings.part_bytes or t_arrival_ns - self._begun_ns >= self._settings.part_ns
-        if grown and min(newest.values()) >= t_arrival_ns - _ALIVE_NS:
+        if grown and not self._waiting and min(newest.values()) >= t_arrival_ns - _ALIVE_NS:
             self._rotate(t_arrival_ns)
 
     def flush_if_due(self) -> None:
@@ -125,6 +127,7 @@ class Parts:
         self.writer.close()
         self._closed_bytes = sum(file.stat().st_size for file in self.files)
         self._begun_ns = t_ns
+        self._waiting = set(self._newest_ns)
         self.writer = self._next_part()
         for info in self._infos.values():
             self.writer.add_camera(info, t_ns)
