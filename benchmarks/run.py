@@ -9,7 +9,7 @@ from typing import Any
 
 from rich.console import Console
 
-from benchmarks import encoder_path, footprint, loop, pose, throughput, tick
+from benchmarks import encoder_path, footprint, loop, pose, recording, throughput, tick
 from benchmarks.plot import draw
 
 _OUT = Path(__file__).resolve().parents[1] / "out" / "benchmarks"
@@ -21,6 +21,7 @@ _BENCHMARKS: dict[str, Callable[[bool], dict[str, Any]]] = {
     "memory": loop.memory,
     "footprint": footprint.run,
     "encoders": encoder_path.run,
+    "recording": recording.run,
 }
 
 
