@@ -231,6 +231,18 @@ def score(
 
 
 @app.command()
+def picture(
+    recording: _Recording,
+    out: Annotated[Path, typer.Option(metavar="FILE", help="Picture to write: .png, .svg or .pdf", show_default=False)],
+    method: _MethodOption = None,
+) -> None:
+    """Draw what the cameras see, the angles beside the truth, and the error (needs the extra 'plots')."""
+    from ghest_rt.cli.picture import draw
+
+    draw(recording, out, method)
+
+
+@app.command()
 def listen(
     connect: Annotated[str, typer.Option(metavar="ENDPOINT", help="Where a ghest-rt publishes")] = "tcp/127.0.0.1:7447",
     count: Annotated[

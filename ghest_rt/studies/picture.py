@@ -34,7 +34,7 @@ def draw_recording(path: Path, out: Path, method: Method | None = None, progress
     try:
         from matplotlib.figure import Figure  # noqa: PLC0415 - an extra, imported only when used
     except ImportError as error:
-        raise GhestError("pictures need Matplotlib: install ghest-rt[plots]") from error
+        raise GhestError("pictures need Matplotlib: pip install 'ghest-rt[plots]'") from error
     run = run_with_truth(path, method, progress=progress)
     figure = Figure(figsize=(11.0, 8.2), layout="constrained")
     grid = figure.add_gridspec(3, 2, height_ratios=(1.5, 1.1, 0.7))

@@ -1,0 +1,47 @@
+"""Score and picture of a shipped recording."""
+
+import json
+from pathlib import Path
+
+import cv2
+import pytest
+
+from ghest_rt.errors import BadInputError
+from ghest_rt.studies.picture import draw_recording
+from ghest_rt.studies.score import score_recording
+
+FIXTURES = Path(__file__).resolve().parents[2] / "sim_fixtures"
+
+
+@pytest.mark.parametrize("movement", ["SAbAd", "SFE", "SIR", "COMB"])
+def test_refined_is_many_times_better_than_the_papers_steps_on_the_same_images(movement: str) -> None:
+    path = FIXTURES / f"{movement}.mcap"
+    refined, paper = score_recording(path, "refined"), score_recording(path, "paper")
+    assert refined.valid_fraction > 0.99
+    assert refined.orientation_rmse_deg < 0.05
+    assert refined.position_rmse_m < 0.1e-3
+    assert 0.25 < paper.orientation_rmse_deg < 1.5
+    assert paper.orientation_rmse_deg > 10 * refined.orientation_rmse_deg
+
+
+def test_the_manifest_describes_the_shipped_files() -> None:
+    import hashlib
+
+    entries = json.loads((FIXTURES / "manifest.json").read_text())["recordings"]
+    assert {entry["file"] for entry in entries} == {path.name for path in FIXTURES.glob("*.mcap")}
+    for entry in entries:
+        assert hashlib.sha256((FIXTURES / entry["file"]).read_bytes()).hexdigest() == entry["sha256"]
+        assert entry["file"] in entry["command"]
+    assert sum((FIXTURES / entry["file"]).stat().st_size for entry in entries) < 30e6
+
+
+def test_the_picture_is_drawn_and_a_wrong_ending_refused(tmp_path: Path) -> None:
+    shares: list[float] = []
+    draw_recording(FIXTURES / "SFE.mcap", tmp_path / "sfe.png", progress=shares.append)
+    image = cv2.imread(str(tmp_path / "sfe.png"))
+    assert image is not None
+    assert image.shape[1] > 1000
+    assert image.std() > 20
+    assert shares == sorted(shares)
+    with pytest.raises(BadInputError, match=r"\.png, \.svg or \.pdf"):
+        draw_recording(FIXTURES / "SFE.mcap", tmp_path / "sfe.gif")
