@@ -8,6 +8,7 @@ class Method(StrEnum):
 
     PAPER = "paper"
     REFINED = "refined"
+    FUSED = "fused"
     ARUCO = "aruco"
 
 

@@ -19,7 +19,7 @@ from ghest_rt.cli.scoreboard import Scoreboard
 from ghest_rt.config.load import LoadedStation, load_station
 from ghest_rt.errors import BadInputError
 from ghest_rt.estimation.offline import estimate_events
-from ghest_rt.estimation.pipeline import Pipeline
+from ghest_rt.estimation.pipeline import Pipeline, lag_ns_of
 from ghest_rt.recording.reader import Recording, open_recordings
 from ghest_rt.service.clocks import ScaledClock
 from ghest_rt.service.compose import AnglesComposer, Numbering
@@ -149,7 +149,7 @@ class _Replayer:
                 service = Service(
                     settings=ServiceSettings(
                         rate_hz=config.rate_hz,
-                        lag_ns=round(config.estimator.lag_ms * 1e6),
+                        lag_ns=lag_ns_of(config, facts.method),
                         inputs=InputSettings(reconnect=False),
                     ),
                     cameras={name: player.camera(name) for name in recording.camera_infos},

@@ -19,7 +19,7 @@ from ghest_rt.config.load import LoadedStation, load_station
 from ghest_rt.config.station import StationConfig
 from ghest_rt.errors import BadInputError, GhestError
 from ghest_rt.estimation.pipeline import Method as PipelineMethod
-from ghest_rt.estimation.pipeline import Pipeline
+from ghest_rt.estimation.pipeline import Pipeline, lag_ns_of
 from ghest_rt.service.clocks import ScaledClock
 from ghest_rt.service.compose import AnglesComposer, Numbering
 from ghest_rt.service.contract import ServiceSettings
@@ -91,7 +91,7 @@ def run_station(options: RunOptions) -> None:
                 cameras, encoders = recording.tap(cameras, encoders)
                 outputs.append(recording.output)
             service = Service(
-                settings=ServiceSettings(config.rate_hz, round(config.estimator.lag_ms * 1e6)),
+                settings=ServiceSettings(config.rate_hz, lag_ns_of(config, method)),
                 cameras=cameras,
                 encoders=encoders,
                 make_pipeline=lambda infos, joints: Pipeline(station, infos, joints, method),

@@ -5,6 +5,7 @@ from typing import Literal
 
 from ghest_drivers.samples import CameraInfo, EncoderSample, RgbdFrame
 from ghest_rt.config.load import LoadedStation
+from ghest_rt.config.station import StationConfig
 from ghest_rt.errors import BadInputError
 from ghest_rt.estimation.arm_chain import CAMERAS
 from ghest_rt.estimation.factory import make_estimator
@@ -12,7 +13,17 @@ from ghest_rt.messages.results import GhEstimate, MarkerObservation
 from ghest_rt.vision.detector import MarkerDetector
 from ghest_rt.vision.factory import make_detector
 
-Method = Literal["paper", "refined", "aruco"]
+Method = Literal["paper", "refined", "aruco", "fused"]
+
+
+def lag_ns_of(config: StationConfig, method: str | None = None) -> int:
+    """Return how long after an instant its estimate is asked for: the station's lag, none where the method forecasts.
+
+    Args:
+        config: The station file.
+        method: Overrides its `estimator.method`.
+    """
+    return 0 if (method or config.estimator.method) == "fused" else round(config.estimator.lag_ms * 1e6)
 
 
 class Pipeline:
@@ -21,7 +32,8 @@ class Pipeline:
     `observe` may run in one thread per camera at a time; `add` and `estimate` belong to one thread together.
 
     Attributes:
-        method: How markers are found and angles estimated ("aruco": OpenCV's markers and the refined estimator).
+        method: How markers are found and angles estimated ("aruco": OpenCV's markers and the refined estimator;
+            "fused": the refined detectors and the filter).
         rate_hz: How often estimates are wanted.
         lag_ns: How long after an instant its estimate is asked for.
     """
@@ -53,13 +65,13 @@ class Pipeline:
             raise BadInputError(f"{station.source}: no camera {' or '.join(missing)}; connect or record both cameras")
         self.method: Method = method or config.estimator.method
         self.rate_hz = config.rate_hz
-        self.lag_ns = round(config.estimator.lag_ms * 1e6)
+        self.lag_ns = lag_ns_of(config, self.method)
         self._detectors = (
             dict(detectors)
             if detectors is not None
             else {
                 camera: make_detector(
-                    self.method,
+                    "refined" if self.method == "fused" else self.method,
                     camera,
                     config.cameras[camera].marker,
                     config.markers[config.cameras[camera].marker],
@@ -73,7 +85,7 @@ class Pipeline:
             station.urdf_text,
             f"{config.exoskeleton.urdf} (of {station.source})",
             encoder_joints,
-            method="paper" if self.method == "paper" else "refined",
+            method="refined" if self.method == "aruco" else self.method,
             frame_rate_hz={camera: camera_infos[camera].rate_hz for camera in CAMERAS},
         )
 

@@ -29,8 +29,8 @@ class Streak:
 
     Attributes:
         count: How many alike.
-        since_ns: Capture time of the first of these.
         length: How many in a row, alike or not.
+        since_ns: Capture time of the first of those alike.
         residual: (6,) innovation of the last: rotation rad, position m, E axes.
     """
 

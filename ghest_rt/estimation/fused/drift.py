@@ -18,7 +18,7 @@ DRIFT_SIZE = 13
 _POSTURE = 9
 _ROWS = np.r_[0:9, 18:24]
 # An answer this unlikely is left out.
-_NEGLIGIBLE = 1e-2
+_NEGLIGIBLE = 2e-2
 # The arm length is taken anew into the geometry when it has changed by this much.
 _LENGTH_STEP_M = 0.004
 

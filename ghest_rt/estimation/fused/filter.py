@@ -32,10 +32,15 @@ _SAME_RAD = math.radians(1.0)
 _SAME_M = 0.003
 # Normalised innovations squared, per degree of freedom, above this are more than noise.
 _USUAL_NIS = 1.5
+# Shares of a surge, tried one after the other.
+_SURGE_SHARES = (0.05, 0.3, 1.0)
 # Standard deviations of a belief before the first pair of sightings.
 _UNKNOWN_RAD, _UNKNOWN_M, _UNKNOWN_RAD_S, _UNKNOWN_M_S = 0.5, 0.2, 1.0, 0.3
 
 _POSITION = np.arange(3, 6)
+_PLACES = np.r_[GH, GH_RATE, BOTH_GH]
+
+_EYE = np.eye(SIZE)
 
 _Item = TypeVar("_Item")
 
@@ -85,7 +90,7 @@ class FusedFilter:
             seen_ns=(m0.t_ns, m1.t_ns),
         )
         for sighting in (m0, m1):
-            _correct(belief, _Update(belief.P, innovation_of(belief, sighting.marker, sighting.pose), sighting.covariance))
+            _Update(belief.P, innovation_of(belief, sighting.marker, sighting.pose), sighting.covariance).apply(belief)
         return belief
 
     def take(self, belief: Belief, sighting: Sighting) -> Outcome:
@@ -93,37 +98,50 @@ class FusedFilter:
         self.process.advance(belief, sighting.t_ns, sighting.e_from_r1)
         which = sighting.marker
         innovation = innovation_of(belief, which, sighting.pose)
-        update = _Update(belief.P, innovation, sighting.covariance)
+        foretold = _Update(belief.P, innovation, sighting.covariance)
+        update = self._surged(foretold, belief.P, innovation, sighting)
         outcome = Outcome.TAKEN
         if not update.nis <= self._tuning.gate:
-            surged = belief.P + self._surge[which]
-            update = _Update(surged, innovation, sighting.covariance)
-            if not update.nis <= self._tuning.gate:
-                streak = _streak(belief.streaks[which], sighting.t_ns, innovation.residual)
-                belief.streaks = _with(belief.streaks, which, streak)
-                if self._has_jumped(streak, sighting.t_ns):
-                    outcome = Outcome.JUMP
-                    moved = _moved_base(belief, which, sighting.pose, update.spread)
-                    belief.base = _with(belief.base, which, moved)
-                elif streak.length >= self._tuning.regain_count:
-                    outcome = Outcome.REGAINED
-                else:
-                    return Outcome.OUTLIER
-                freed = self._freed(surged, which, everything=outcome is Outcome.JUMP)
-                update = _Update(freed, innovation, sighting.covariance)
-        _correct(belief, update)
-        self._adapt(belief, which, update)
+            streak = _streak(belief.streaks[which], sighting.t_ns, innovation.residual)
+            belief.streaks = _with(belief.streaks, which, streak)
+            if self._has_jumped(streak, sighting.t_ns):
+                outcome = Outcome.JUMP
+                moved = _moved_base(belief, which, sighting.pose, foretold.spread)
+                belief.base = _with(belief.base, which, moved)
+            elif streak.length >= self._tuning.regain_count:
+                outcome = Outcome.REGAINED
+            else:
+                return Outcome.OUTLIER
+            freed = self._freed(belief.P, which, everything=outcome is Outcome.JUMP)
+            update = _Update(freed, innovation, sighting.covariance)
+        update.apply(belief)
+        if outcome is Outcome.TAKEN:
+            self._adapt(belief, which, foretold.surprise[:3])
         belief.streaks = _with(belief.streaks, which, Streak())
         belief.seen_ns = _with(belief.seen_ns, which, sighting.t_ns)
         return outcome
 
-    def _adapt(self, belief: Belief, which: int, update: "_Update") -> None:
-        """Let the agility of a marker's body follow the innovations: alike in a row means that the belief lags behind."""
+    def _surged(self, foretold: "_Update", P: Array, innovation: Innovation, sighting: Sighting) -> "_Update":
+        """Return an update that allows for as much unforeseen movement as a surprising innovation calls for, and no more."""
+        update = foretold
+        for share in _SURGE_SHARES:
+            if update.nis <= self._tuning.surprising:
+                break
+            update = _Update(P + share * self._surge[sighting.marker], innovation, sighting.covariance)
+        return update
+
+    def _adapt(self, belief: Belief, which: int, turn: Array) -> None:
+        """Let the agility of a marker's body follow the innovations: alike in a row means that the belief lags behind.
+
+        Args:
+            belief: Changed in place.
+            which: The marker.
+            turn: (3,) innovation of its rotation, whitened.
+        """
         tuning = self._tuning
-        turn = update.surprise[:3]
-        alike = float(turn @ belief.surprise[which]) / 3.0
-        excess = max(float(turn @ turn) / 3.0 - _USUAL_NIS, 0.0)
-        push = tuning.agility_gain * (min(max(alike, -1.0), 3.0) + min(excess, 3.0) - tuning.agility_rest)
+        alike = min(max(float(turn @ belief.surprise[which]) / 3.0, -1.0), 3.0)
+        excess = min(max(float(turn @ turn) / 3.0 - _USUAL_NIS, 0.0), 3.0)
+        push = tuning.agility_gain * (alike + excess - tuning.agility_rest)
         agility = min(max(belief.agility[which] * math.exp(push), tuning.least_agility), tuning.most_agility)
         belief.agility = _with(belief.agility, which, agility)
         belief.surprise = _with(belief.surprise, which, turn)
@@ -148,30 +166,47 @@ class FusedFilter:
 
 
 class _Update:
-    """The Kalman update in square-root form of the innovation: S = L L', Y = L^-1 H P, surprise = L^-1 residual."""
+    """A Kalman update whose gain for positions leaves the believed rotation aside.
+
+    Rotations and their rates take the optimal gain. The GH centre, in E and in the markers, is judged by the measured position
+    together with the *measured* rotation: what of the position's innovation follows from the rotation's is taken out first. A
+    belief that lags behind in a movement would otherwise teach a wrong GH centre, for good. Any gain may be used as long as
+    the covariance is updated in Joseph's form.
+    """
 
     def __init__(self, P: Array, innovation: Innovation, R: Array) -> None:
-        H_P = innovation.H @ P
-        S = H_P @ innovation.H.T + R
-        S[_POSITION, _POSITION] += innovation.bend_m2
-        solved = np.linalg.solve(np.linalg.cholesky(S), np.column_stack((H_P, innovation.residual)))
-        self.P = P
+        H = innovation.H
+        self._P = P
+        self._residual = innovation.residual
+        self._H_P = H @ P
+        noise = R.copy()
+        noise[_POSITION, _POSITION] += innovation.bend_m2
+        S = self._H_P @ H.T + noise
         self.spread = S
-        self.Y = solved[:, :-1]
-        self.surprise = solved[:, -1]
+        self._H, self._noise = H, noise
+        self._root = np.linalg.cholesky(S)
+        self._without_rotation = innovation.without_rotation
+        self.surprise = np.linalg.solve(self._root, innovation.residual)
         self.nis = float(self.surprise @ self.surprise)
 
-
-def _correct(belief: Belief, update: _Update) -> None:
-    belief.P = update.P - update.Y.T @ update.Y
-    belief.shift(update.surprise @ update.Y)
+    def apply(self, belief: Belief) -> None:
+        """Correct a belief."""
+        T, S, H_P = self._without_rotation, self.spread, self._H_P
+        gain = np.linalg.solve(S, H_P).T
+        T_H_P = T @ H_P
+        apart = np.linalg.solve(T @ S @ T.T, T_H_P).T @ T
+        gain[_PLACES] = apart[_PLACES]
+        kept = _EYE - gain @ self._H
+        P = kept @ self._P @ kept.T + gain @ self._noise @ gain.T
+        belief.P = 0.5 * (P + P.T)
+        belief.shift(gain @ self._residual)
 
 
 def _streak(streak: Streak, t_ns: int, residual: Array) -> Streak:
     apart = residual - streak.residual
     if streak.count and np.linalg.norm(apart[:3]) < _SAME_RAD and np.linalg.norm(apart[3:]) < _SAME_M:
-        return Streak(streak.count + 1, streak.since_ns, streak.length + 1, residual)
-    return Streak(1, t_ns, streak.length + 1, residual)
+        return Streak(streak.count + 1, streak.length + 1, streak.since_ns, residual)
+    return Streak(1, streak.length + 1, t_ns, residual)
 
 
 def _moved_base(belief: Belief, which: int, pose: Array, spread: Array) -> Base:
@@ -207,4 +242,5 @@ def _surges(tuning: Tuning) -> tuple[Array, Array]:
     acromion[ACROMION], acromion[ACROMION_RATE] = turn, rate
     acromion[GH], acromion[GH_RATE] = tuning.surge_m**2, tuning.surge_rate_m_s**2
     arm[ARM], arm[ARM_RATE] = turn, rate
+    arm[GH], arm[GH_RATE] = acromion[GH], acromion[GH_RATE]
     return np.diag(acromion), np.diag(arm)

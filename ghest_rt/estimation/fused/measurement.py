@@ -20,11 +20,13 @@ class Innovation:
         H: (6, 24) its dependence on the error state.
         bend_m2: Variance of the position by the product of two errors, which H leaves out: without it, the noise of the
             rotation would pass for movement, which tells where the GH centre is.
+        without_rotation: (3, 6) takes from the position's residual what follows from that of the rotation.
     """
 
     residual: Array
     H: Array
     bend_m2: float
+    without_rotation: Array
 
 
 def innovation_of(belief: Belief, marker: int, e_from_marker: Array) -> Innovation:
@@ -46,4 +48,5 @@ def innovation_of(belief: Belief, marker: int, e_from_marker: Array) -> Innovati
     residual[3:] = e_from_marker[:3, 3] - belief.p_gh + lever
     variance = belief.P.diagonal()
     bend = float(variance[_ROTATION[marker]].sum() * variance[GH_IN_MARKER[marker]].sum()) / 3.0
-    return Innovation(residual, H, bend)
+    without_rotation = np.concatenate((-H[3:, _ROTATION[marker]], _EYE_3), axis=1)
+    return Innovation(residual, H, bend, without_rotation)

@@ -91,8 +91,8 @@ class Process:
 
     def _agility(self, belief: Belief, t_ns: int) -> Array:
         factors = [
-            max(agility, self._bridging) if t_ns - seen_ns > _UNSEEN_NS else agility
-            for agility, seen_ns in zip(belief.agility, belief.seen_ns, strict=True)
+            max(agility, bridging) if t_ns - seen_ns > _UNSEEN_NS else agility
+            for agility, bridging, seen_ns in zip(belief.agility, self._bridging, belief.seen_ns, strict=True)
         ]
         return np.repeat(factors, (6, 3))
 

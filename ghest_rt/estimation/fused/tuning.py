@@ -15,7 +15,7 @@ class Tuning:
         least_agility: The agility that remains at rest.
         starting_agility: The agility before anything is known.
         most_agility: The greatest agility, during movement that the model does not foresee.
-        bridging_agility: The least agility while a marker is not seen: what its body does then is not known.
+        bridging_agility: The least agility of m0's and m1's body while the marker is not seen: what it does then is not known.
         agility_gain: How fast the agility follows the innovations.
         agility_rest: How fast it falls while the innovations are white.
         rotation_floor_rad: Added to the standard deviation of every measured rotation.
@@ -25,7 +25,8 @@ class Tuning:
         forecast_m_s3: Times the cube of the time the joints are forecast over: what the forecast adds to `encoder_m`.
         default_rotation_rad: Standard deviation of a measured rotation that comes without covariance.
         default_position_m: The same of a position.
-        gate: A measurement with a normalised innovation squared above this is an outlier (6 degrees of freedom).
+        surprising: A normalised innovation squared above this is unforeseen movement, as far as a surge explains it.
+        gate: Above this in spite of a whole surge, the measurement is an outlier (6 degrees of freedom).
         surge_rad: A movement no model foresees may turn a body by this much between frames.
         surge_m: And shift the GH centre by this much.
         surge_rate_rad_s: And change its rate by this much.
@@ -49,11 +50,11 @@ class Tuning:
 
     rate_memory_s: float = 1.0
     rotation_density: float = 2e-5
-    position_density: float = 1e-7
+    position_density: float = 1e-5
     least_agility: float = 1.0
     starting_agility: float = 100.0
     most_agility: float = 1e6
-    bridging_agility: float = 300.0
+    bridging_agility: tuple[float, float] = (1000.0, 300.0)
     agility_gain: float = 0.2
     agility_rest: float = 0.15
     rotation_floor_rad: float = math.radians(0.003)
@@ -63,6 +64,7 @@ class Tuning:
     forecast_m_s3: float = 10.0
     default_rotation_rad: float = math.radians(0.3)
     default_position_m: float = 5e-4
+    surprising: float = 22.0
     gate: float = 45.0
     surge_rad: float = 0.01
     surge_m: float = 0.0015
@@ -80,6 +82,6 @@ class Tuning:
     exact_m: float = 2e-5
     exact_rad: float = math.radians(0.005)
     slide_cost: float = 6.0
-    turn_cost: float = 12.0
+    turn_cost: float = 9.0
     arm_length_m: float = 1e-3
     unknown_arm_length_m: float = 0.05
