@@ -72,7 +72,7 @@ class BlobFinder:
             coarse = image
         packed = np.asarray(cv2.cvtColor(coarse, cv2.COLOR_RGB2BGR565)).view(np.uint16)[..., 0]
         mask = np.take(self._table(white), packed)
-        count, _, stats, centroids = cv2.connectedComponentsWithStats(mask, connectivity=4, ltype=cv2.CV_16U)
+        count, _, stats, centroids = cv2.connectedComponentsWithStats(mask, connectivity=8, ltype=cv2.CV_16U)
         if count < 2:
             return None
         left, top, width, height, area = (stats[1:, key].astype(np.float64) for key in range(5))

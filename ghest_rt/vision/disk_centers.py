@@ -88,7 +88,7 @@ class DiskMeter:
         if predicted.minor_px < _MIN_MINOR_PX:
             return (None,) * 4
         band = band_px / predicted.minor_px
-        half = int(predicted.extent_px * (1.0 + band)) + 2
+        half = int(predicted.extent_px * (1.0 + band)) + 1
         size = 2 * half + 1
         if size > min(height, width):
             return (None,) * 4

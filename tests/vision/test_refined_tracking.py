@@ -138,3 +138,15 @@ def test_a_wrong_branch_is_left_as_soon_as_the_image_tells():
     centers = _noisy_centers(pose, 0.02, np.random.default_rng(62))
     solution = solver.track(centers, None, (mirrored(pose[:3, :3], pose[:3, 3]), pose[:3, 3]))
     assert pose_error(transform(solution.fit.R, solution.fit.p_m), pose)[0] < 0.5
+
+
+@pytest.mark.parametrize(
+    ("distance_m", "status"),
+    [(0.02, MarkerStatus.OUT_OF_RANGE), (0.5, MarkerStatus.COLOR_ONLY), (2.5, MarkerStatus.OUT_OF_RANGE)],
+)
+def test_poses_that_no_sensor_can_see_are_out_of_range(distance_m, status):
+    solver = Solver(LAYOUT, Optics(INFO.color))
+    pose = facing_pose(0.3, 1.0, 0.2, [0.0, 0.0, distance_m])
+    solution = solver.track(_noisy_centers(pose, 0.01, np.random.default_rng(63)), None, (pose[:3, :3], pose[:3, 3]))
+    assert solution.status is status
+    assert (solution.fit is not None) == (status is MarkerStatus.COLOR_ONLY)
