@@ -1,6 +1,7 @@
 """What the filter believes at one instant: a point on the manifold and the covariance of the error around it."""
 
-from dataclasses import dataclass, field, replace
+from copy import copy
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -61,7 +62,7 @@ class Base:
 
 @dataclass(slots=True, eq=False)
 class Belief:
-    """State of the filter. Arrays are replaced, never written to, except `P` by the owner of a copy.
+    """State of the filter. Arrays are replaced, never written to, so that a copy shares them.
 
     Attributes:
         t_ns: The instant.
@@ -93,7 +94,7 @@ class Belief:
 
     def copy(self) -> "Belief":
         """Return a copy that may be moved on without touching this one."""
-        return replace(self, P=self.P.copy())
+        return copy(self)
 
     def e_from(self, marker: int) -> Array:
         """Return the (4, 4) pose of m0 (0) or m1 (1) in E, equation (7)."""

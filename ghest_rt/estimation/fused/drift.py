@@ -19,6 +19,8 @@ _POSTURE = 9
 _ROWS = np.r_[0:9, 18:24]
 # An answer this unlikely is left out.
 _NEGLIGIBLE = 2e-2
+# The answers are weighed this often.
+_WEIGH_NS = 60_000_000
 # The arm length is taken anew into the geometry when it has changed by this much.
 _LENGTH_STEP_M = 0.004
 
@@ -73,27 +75,42 @@ class DriftJudge:
         self._test = np.where(spread, moved, tolerance)
         self._prior = np.where(spread, moved, exact)
         self._explained: _Explained | None = None
+        self._weighed: _Explained | None = None
+        self._weighed_ns = 0
+        self._weights = np.zeros(16)
 
     def judge(self, belief: Belief) -> Posture:
         """Return the bones as the mean over the answers, with the covariance of the mixture."""
         explained = self._explanations(belief)
         found = np.concatenate(belief.gh_in_marker) - explained.expected
-        P_gg = belief.P[BOTH_GH, BOTH_GH]
-        S = P_gg + explained.test
-        distance = np.linalg.solve(S, np.broadcast_to(found[:, None], (16, 6, 1)))[:, :, 0] @ found
-        cost = distance + np.linalg.slogdet(S)[1] + self._cost
-        odds = np.exp(-0.5 * (cost - cost.min()))
-        odds[odds < _NEGLIGIBLE] = 0.0
-        weights = odds / odds.sum()
+        weights = self._weigh(belief, explained, found)
         kept = np.flatnonzero(weights)
         means, covariances = zip(*(self._posture(belief, explained, int(h), found) for h in kept), strict=True)
+        if len(kept) == 1:
+            return self._compose(belief, explained, means[0], covariances[0], self._drifted(weights))
         mean = np.sum([weights[h] * m for h, m in zip(kept, means, strict=True)], axis=0)
         covariance = np.zeros((_POSTURE + DRIFT_SIZE, _POSTURE + DRIFT_SIZE))
         for h, m, part in zip(kept, means, covariances, strict=True):
             apart = m - mean
             covariance += weights[h] * (part + np.outer(apart, apart))
-        drifted = [float(weights[self._moved[:, 2 * k] | self._moved[:, 2 * k + 1]].sum()) for k in (0, 1)]
-        return self._compose(belief, explained, mean, covariance, (drifted[0], drifted[1]))
+        return self._compose(belief, explained, mean, covariance, self._drifted(weights))
+
+    def _drifted(self, weights: Array) -> tuple[float, float]:
+        m0, m1 = (float(weights[self._moved[:, k] | self._moved[:, k + 1]].sum()) for k in (0, 2))
+        return m0, m1
+
+    def _weigh(self, belief: Belief, explained: "_Explained", found: Array) -> Array:
+        """Return the (16,) probabilities of the answers; drift is slow, they are asked for anew only now and then."""
+        if self._weighed is explained and 0 <= belief.t_ns - self._weighed_ns < _WEIGH_NS:
+            return self._weights
+        S = belief.P[BOTH_GH, BOTH_GH] + explained.test
+        distance = np.linalg.solve(S, np.broadcast_to(found[:, None], (16, 6, 1)))[:, :, 0] @ found
+        cost = distance + np.linalg.slogdet(S)[1] + self._cost
+        odds = np.exp(-0.5 * (cost - cost.min()))
+        odds[odds < _NEGLIGIBLE] = 0.0
+        self._weights = odds / odds.sum()
+        self._weighed, self._weighed_ns = explained, belief.t_ns
+        return self._weights
 
     def _explanations(self, belief: Belief) -> "_Explained":
         """Return what each answer expects of the GH centre in the markers; kept while arm length and jumps stay as they are."""

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from ghest_rt.estimation.fused.belief import ACROMION, ARM, BOTH_GH, GH, GH_IN_MARKER, GH_RATE, POSES, RATES, Belief
+from ghest_rt.estimation.fused.belief import ACROMION, ARM, BOTH_GH, GH, GH_IN_MARKER, GH_RATE, SIZE, Belief
 from ghest_rt.estimation.fused.tuning import Tuning
 from ghest_rt.geometry.so3 import Array, exp_so3, quat_wxyz_from_matrix, skew
 
@@ -12,7 +12,10 @@ from ghest_rt.geometry.so3 import Array, exp_so3, quat_wxyz_from_matrix, skew
 _UNSEEN_NS = 80_000_000
 # Keeps the shortest rotation finite between opposite directions, which no forecast joins.
 _LEAST = 1e-6
+_EYE = np.eye(SIZE)
 _EYE_3 = np.eye(3)
+# From one element of the diagonal to the next in the flat covariance.
+_STEP = SIZE + 1
 
 
 class Process:
@@ -54,22 +57,18 @@ class Process:
         p_gh = belief.p_gh + move[GH]
         m0, m1 = belief.e_from_marker
         upper_arm = m1 @ (belief.gh_in_marker[1] - self._elbow_in_m1)
-        length2 = float(upper_arm @ upper_arm)
         follow = follow_encoders(belief, upper_arm, p_gh, e_from_r1)
         belief.e_from_marker = (exp_so3(move[ACROMION]) @ m0, exp_so3(move[ARM]) @ follow @ m1)
         belief.p_gh = p_gh
         belief.rates = decay * belief.rates
         belief.e_from_r1 = e_from_r1
-        P = belief.P
-        P[ARM] = follow @ P[ARM]
-        P[:, ARM] = P[:, ARM] @ follow.T
-        lean = skew((carry / length2) * upper_arm)
-        P[ARM] += lean @ P[GH_RATE]
-        P[:, ARM] += P[:, GH_RATE] @ lean.T
-        P[POSES] += carry * P[RATES]
-        P[:, POSES] += carry * P[:, RATES]
-        P[RATES] *= decay
-        P[:, RATES] *= decay
+        F = _EYE.copy()
+        diagonal = F.ravel()
+        diagonal[9 : 9 * _STEP : _STEP] = carry
+        diagonal[9 * _STEP : 18 * _STEP : _STEP] = decay
+        F[ARM, ARM] = follow
+        F[ARM, GH_RATE] = skew((carry / float(upper_arm @ upper_arm)) * upper_arm)
+        belief.P = F @ belief.P @ F.T
         self._disturb(belief, dt, decay, t_ns)
         belief.t_ns = t_ns
 
@@ -78,23 +77,22 @@ class Process:
         tau = self._memory_s
         fresh = 0.5 * tau * (1.0 - decay * decay)
         carry = tau * (1.0 - decay)
-        density = self._density * self._agility(belief, t_ns)
+        density = self._density.copy()
+        density[:6] *= self._agility(belief, 0, t_ns)
+        density[6:] *= self._agility(belief, 1, t_ns)
         diagonal = belief.P.ravel()
-        step = belief.P.shape[0] + 1
-        diagonal[0 : 9 * step : step] += tau * tau * (dt - 2.0 * carry + fresh) * density
-        diagonal[9 * step : 18 * step : step] += fresh * density
-        cross = 0.5 * carry * carry * density
-        diagonal[9 : 9 * step : step] += cross
-        diagonal[9 * (step - 1) : 18 * step - 9 : step] += cross
-        creep = diagonal[18 * step :: step]
-        creep += np.where(creep < self._most, dt * self._creep, 0.0)
+        diagonal[0 : 9 * _STEP : _STEP] += (tau * tau * (dt - 2.0 * carry + fresh)) * density
+        diagonal[9 * _STEP : 18 * _STEP : _STEP] += fresh * density
+        cross = (0.5 * carry * carry) * density
+        diagonal[9 : 9 * _STEP : _STEP] += cross
+        diagonal[9 * (_STEP - 1) : 18 * _STEP - 9 : _STEP] += cross
+        creep = diagonal[18 * _STEP :: _STEP]
+        if creep.max() < self._most:
+            creep += dt * self._creep
 
-    def _agility(self, belief: Belief, t_ns: int) -> Array:
-        factors = [
-            max(agility, bridging) if t_ns - seen_ns > _UNSEEN_NS else agility
-            for agility, bridging, seen_ns in zip(belief.agility, self._bridging, belief.seen_ns, strict=True)
-        ]
-        return np.repeat(factors, (6, 3))
+    def _agility(self, belief: Belief, which: int, t_ns: int) -> float:
+        unseen = t_ns - belief.seen_ns[which] > _UNSEEN_NS
+        return max(belief.agility[which], self._bridging[which]) if unseen else belief.agility[which]
 
 
 def follow_encoders(belief: Belief, upper_arm: Array, p_gh: Array, e_from_r1: Array) -> Array:
@@ -112,14 +110,17 @@ def follow_encoders(belief: Belief, upper_arm: Array, p_gh: Array, e_from_r1: Ar
     before = belief.e_from_r1
     moved = e_from_r1[:3, :3] @ before[:3, :3].T
     p_elbow = moved @ (belief.p_gh - upper_arm - before[:3, 3]) + e_from_r1[:3, 3]
-    V, W = _unit(upper_arm), _unit(p_gh - p_elbow)
+    ax, ay, az = _unit(upper_arm)
+    bx, by, bz = _unit(p_gh - p_elbow)
     # Shortest rotation from V to W: I + [c]x + [c]x^2 / (1 + V.W), c = V x W.
-    C = skew(np.array([V[1] * W[2] - V[2] * W[1], V[2] * W[0] - V[0] * W[2], V[0] * W[1] - V[1] * W[0]]))
-    swing = _EYE_3 + C + C @ C / max(1.0 + float(V @ W), _LEAST)
-    q = quat_wxyz_from_matrix(moved)
-    twist = 2.0 * math.atan2(float(q[1:] @ V), float(q[0]))
-    return np.asarray(swing @ exp_so3(twist * V))
+    C = skew(np.array([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx]))
+    swing = _EYE_3 + C + C @ C / max(1.0 + ax * bx + ay * by + az * bz, _LEAST)
+    w, x, y, z = quat_wxyz_from_matrix(moved).tolist()
+    twist = 2.0 * math.atan2(x * ax + y * ay + z * az, w)
+    return np.asarray(swing @ exp_so3(np.array([twist * ax, twist * ay, twist * az])))
 
 
-def _unit(v: Array) -> Array:
-    return v / math.sqrt(max(float(v @ v), _LEAST))
+def _unit(v: Array) -> tuple[float, float, float]:
+    x, y, z = v.tolist()
+    size = math.sqrt(max(x * x + y * y + z * z, _LEAST))
+    return x / size, y / size, z / size
