@@ -16,7 +16,7 @@ from ghest_rt.vision.pose_fit import Centers, PoseFit, fit_pose
 
 _TRACKED_STEPS = 4
 _COLD_STEPS = 8
-_SIGMA_FLOOR_PX = 0.006  # pixel aliasing of an anti-aliased disk of a few pixels' radius
+_SIGMA_FLOOR_PX = 0.004  # pixel aliasing of an anti-aliased disk of a few pixels' radius
 _SIGMA_FACTOR = 1.3  # edges are noisier than interiors: colour and brightness model errors add there
 _MAX_DEVIATION_PX = 0.35
 _MAX_DEVIATION_SIGMAS = 5.0
