@@ -1,7 +1,7 @@
 """The live loop on a 128x128 recording at recorded pace: rate, lateness beside a bare `clock_nanosleep` loop, CPU, memory.
 
-The service runs in a process of its own and publishes on Zenoh to one subscriber, as in the clinic; the bare loop runs at the same
-time on the same cores, so that both suffer the same machine.
+The service runs in a process of its own and publishes on Zenoh to one subscriber, as in the clinic; the bare loop runs at the
+same time on the same cores, so that both suffer the same machine.
 """
 
 import json

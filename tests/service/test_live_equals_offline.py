@@ -39,7 +39,7 @@ async def test_live_and_offline_agree_to_the_last_digit(recording: Recording, me
             recording.events(), Pipeline(recording.station, recording.camera_infos, recording.encoder_joints, method)
         )
     }
-    clock = ScaledClock()
+    clock = ScaledClock(0.3)  # slowly, for the same reason
     player = ReplayPlayer(recording.events(), recording.camera_infos, EncoderInfo("encoders", recording.encoder_joints), clock)
     out = Collector()
     service = Service(
