@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ghest_drivers.clock import Clock
+from ghest_drivers.hardware.cameras.frozen import FrozenWatch
 from ghest_drivers.hardware.oak.settings import OakSettings
 from ghest_drivers.hardware.realsense.settings import RealsenseSettings
 from ghest_drivers.hardware.supervisor.camera import SupervisedCamera
@@ -27,7 +28,7 @@ def realsense(*, name: str, clock: Clock, supervised: bool = True, watchdog_ms: 
         watchdog_ms: How long that process may send no frame.
         settings: `serial`, and the fields of `RealsenseSettings` (`latency_ms` in place of `latency_ns`).
     """
-    return _make(realsense_here, name, clock, settings, watchdog_ms if supervised else None)
+    return FrozenWatch(_make(realsense_here, name, clock, settings, watchdog_ms if supervised else None))
 
 
 def realsense_bag(
@@ -39,7 +40,7 @@ def realsense_bag(
 
 def oak(*, name: str, clock: Clock, supervised: bool = True, watchdog_ms: int = 500, **settings: object) -> RgbdCamera:
     """Return the driver of a connected OAK camera: `mxid`, and the fields of `OakSettings`; otherwise as `realsense`."""
-    return _make(oak_here, name, clock, settings, watchdog_ms if supervised else None)
+    return FrozenWatch(_make(oak_here, name, clock, settings, watchdog_ms if supervised else None))
 
 
 def realsense_here(

@@ -55,7 +55,7 @@ def _reset(camera: Any) -> None:
     if reset is not None:
         try:
             reset()
-        except DriverError as error:
+        except Exception as error:  # a device that cannot be reset, or refuses it, may open all the same
             _log.warning("hardware reset: %s", error)
 
 
