@@ -82,6 +82,9 @@ class Calibration(Strict):
     link_from_camera: dict[str, RigidMatrix] = Field(description="Camera (OpenCV axes) in its link's frame, eq. (6)")
     m0_from_gh: RigidMatrix = Field(description="GH joint frame in the m0 frame, eq. (8)")
     m1_from_elw: RigidMatrix = Field(description="Elbow frame in the m1 frame, eq. (9)")
+    arm_length_m: float | None = Field(
+        default=None, gt=0.1, lt=0.6, description="From elbow to GH centre; lets method fused see m1 slide along the arm"
+    )
 
     def link_from_camera_array(self, camera: str) -> Array:
         """Return T_r^l of eq. (6)."""

@@ -43,5 +43,5 @@ def make_estimator(
     if chosen == "paper":
         return PaperEstimator(chain, max_gap_ns, period_ns)
     if chosen == "fused":
-        return FusedEstimator(chain, max_gap_ns, period_ns)
+        return FusedEstimator(chain, max_gap_ns, period_ns, arm_length_m=config.calibration.arm_length_m)
     return RefinedEstimator(chain, max_gap_ns, period_ns, config.estimator.encoder_pairing)

@@ -106,7 +106,7 @@ class FusedEstimator:
         if known is None or joints is None:
             return lost(t_ns, self._why_nothing(t_ns), self._inputs.newest_ns)
         belief = known.copy()
-        self._filter.process.advance(belief, t_ns, self._e_from_r1(joints))
+        self._filter.process.advance(belief, t_ns, self._e_from_r1(joints), doubt=self._tuning.forecast_doubt)
         stale = self._stale(belief, t_ns)
         posture = self._judge.judge(belief)
         e_from_arm = step3_4_5_e_from_arm(posture.e_from_gh, posture.e_from_elw)

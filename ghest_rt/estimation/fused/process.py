@@ -39,13 +39,14 @@ class Process:
             self._creep[part.start - BOTH_GH.start : part.stop - BOTH_GH.start] = creep
         self._most = tuning.unknown_gh_m**2
 
-    def advance(self, belief: Belief, t_ns: int, e_from_r1: Array) -> None:
+    def advance(self, belief: Belief, t_ns: int, e_from_r1: Array, *, doubt: float = 1.0) -> None:
         """Move a belief on to `t_ns`; nothing happens if it is not later.
 
         Args:
             belief: Moved on in place.
             t_ns: The instant.
             e_from_r1: (4, 4) camera r1 in E at `t_ns`: the encoders' part in the forecast.
+            doubt: Factor on the process noise.
         """
         dt = (t_ns - belief.t_ns) * 1e-9
         if dt <= 0.0:
@@ -69,15 +70,15 @@ class Process:
         F[ARM, ARM] = follow
         F[ARM, GH_RATE] = skew((carry / float(upper_arm @ upper_arm)) * upper_arm)
         belief.P = F @ belief.P @ F.T
-        self._disturb(belief, dt, decay, t_ns)
+        self._disturb(belief, dt, decay, t_ns, doubt)
         belief.t_ns = t_ns
 
-    def _disturb(self, belief: Belief, dt: float, decay: float, t_ns: int) -> None:
+    def _disturb(self, belief: Belief, dt: float, decay: float, t_ns: int, doubt: float) -> None:
         """Add the process noise: exact for the decaying rates, a random walk for the creep."""
         tau = self._memory_s
         fresh = 0.5 * tau * (1.0 - decay * decay)
         carry = tau * (1.0 - decay)
-        density = self._density.copy()
+        density = doubt * self._density
         density[:6] *= self._agility(belief, 0, t_ns)
         density[6:] *= self._agility(belief, 1, t_ns)
         diagonal = belief.P.ravel()

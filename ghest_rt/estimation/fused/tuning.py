@@ -18,6 +18,7 @@ class Tuning:
         bridging_agility: The least agility of m0's and m1's body while the marker is not seen: what it does then is not known.
         agility_gain: How fast the agility follows the innovations.
         agility_rest: How fast it falls while the innovations are white.
+        forecast_doubt: Factor on the process noise after the newest sighting: nothing corrects a forecast that is published.
         rotation_floor_rad: Added to the standard deviation of every measured rotation.
         position_floor_m: Added to that of every measured position.
         encoder_m: Standard deviation of a marker's position in E that comes from the encoders.
@@ -57,9 +58,10 @@ class Tuning:
     bridging_agility: tuple[float, float] = (1000.0, 300.0)
     agility_gain: float = 0.2
     agility_rest: float = 0.15
+    forecast_doubt: float = 5.0
     rotation_floor_rad: float = math.radians(0.003)
     position_floor_m: float = 3e-6
-    encoder_m: float = 5e-5
+    encoder_m: float = 2e-4
     encoder_rad: float = math.radians(0.005)
     forecast_m_s3: float = 10.0
     default_rotation_rad: float = math.radians(0.3)
