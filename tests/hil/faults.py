@@ -28,9 +28,8 @@ class Fault:
         name: As in the table.
         devices: Which devices misbehave.
         mode: What the fixtures do.
+        reasons: One of these must be told; none where the service sees through the fault.
         seconds: For so long.
-        statuses: What a subscriber may see meanwhile; "valid" where the service is to see through it.
-        reasons: The reasons expected among those that are seen; none if the service may see through the fault.
         rigs: Where it can happen.
     """
 
@@ -75,7 +74,7 @@ class Seen:
         states: How many had which status and reason.
         detected_ms: From its beginning to the first sample that is not plainly valid; None if there was none.
         recovered_ms: From its end to the first of the valid samples that follow one another; None: never.
-        stale: Samples with angles that are not the truth of their instant.
+        stale: Samples called valid whose angles are not the truth of their instant.
         worst_deg: The largest error among the samples with angles.
         missing: Samples that never came.
     """
@@ -110,7 +109,7 @@ def measure(rig: Rig, fault: Fault) -> Seen:
     seen = rig.subscriber.between(window.from_ns, time.monotonic_ns())
     first_bad = next((sample for sample in seen if not sample.valid), None)
     recovered_ns = _recovered_ns(seen, window.until_ns) if well else None
-    errors = [_error_deg(rig, sample) for sample in seen if sample.body["quaternion_wxyz"] is not None]
+    errors = [(sample.valid, _error_deg(rig, sample)) for sample in seen if sample.body["quaternion_wxyz"] is not None]
     numbers = [sample.body["seq"] for sample in seen]
     return Seen(
         rig=rig.name,
@@ -119,8 +118,8 @@ def measure(rig: Rig, fault: Fault) -> Seen:
         states=Counter((sample.body["status"], sample.body["reason"]) for sample in seen),
         detected_ms=None if first_bad is None else (first_bad.body["t_publish_ns"] - window.from_ns) * 1e-6,
         recovered_ms=None if recovered_ns is None else max(recovered_ns - window.until_ns, 0) * 1e-6,
-        stale=sum(error > WRONG_DEG for error in errors),
-        worst_deg=max(errors, default=0.0),
+        stale=sum(valid and error > WRONG_DEG for valid, error in errors),
+        worst_deg=max((error for _, error in errors), default=0.0),
         missing=numbers[-1] - numbers[0] + 1 - len(numbers) if numbers else 0,
     )
 

@@ -105,6 +105,11 @@ class Rig:
             lambda: len(angles) >= start + count and all(sample.valid for sample in angles[-count:]), timeout_s
         )
 
+    def log(self) -> str:
+        """Return what the service has written; with fixtures only."""
+        assert self._folder is not None
+        return (self._folder / f"{self.name}.log").read_text()
+
     def stop(self) -> int:
         """End the service as systemd would; returns its exit code."""
         self.service.send_signal(signal.SIGTERM)
@@ -172,9 +177,10 @@ def station_text(name: str, folder: Path) -> str:
     """Return the station file: the scene's, with the fixtures' devices."""
     facts = json.loads((folder / "scene.json").read_text())
     settings = ", ".join(f"{key} = {value!r}" for key, value in facts["settings_m"].items())
-    lines = []
-    for line in (folder / STATION_FILE).read_text().splitlines():
-        lines.append(f"settings_m = {{ {settings} }}" if line.startswith("settings_m") else line)
+    lines = [
+        f"settings_m = {{ {settings} }}" if line.startswith("settings_m") else line
+        for line in (folder / STATION_FILE).read_text().splitlines()
+    ]
     text = "\n".join(lines).replace('id = "sim"', 'id = "hil"', 1).replace("lag_ms = 45.0", "lag_ms = 70.0")
     size = f"width_px = 128, height_px = 128, rate_hz = {FRAME_RATE_HZ}"
     for camera in ("r0", "r1"):

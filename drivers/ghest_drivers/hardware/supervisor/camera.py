@@ -96,13 +96,13 @@ class SupervisedCamera:
             raise
 
     def close(self) -> None:
-        """See `RgbdCamera.close`."""
+        """See `RgbdCamera.close`. Returns when the child has ended, also if another thread closes at the same time."""
         self._abort.set()
         with self._lock:
             link, self._link = self._link, None
-        if link is not None:
-            link.close()
-            self.stats.overwritten += link.overwritten
+            if link is not None:
+                link.close()
+                self.stats.overwritten += link.overwritten
 
     def _note_loss(self) -> None:
         self.stats.lost += 1
