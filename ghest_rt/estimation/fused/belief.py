@@ -72,6 +72,7 @@ class Belief:
         rates: (9,) of m0 (rad/s), of the GH centre (m/s), of m1 beyond what the encoders tell (rad/s); E axes.
         gh_in_marker: (3,) GH centre in the frame of m0 as it is, and in that of m1, m.
         P: (24, 24) covariance of the error state.
+        speed_rad_s: How fast camera r1 turns, averaged.
         agility: Factor on the process noise of m0 with the GH centre, and of m1.
         seen_ns: Capture time of the last measurement accepted of m0 and m1.
         surprise: Of m0 and m1: (3,) the last innovation of the rotation, whitened.
@@ -88,6 +89,7 @@ class Belief:
     P: Array
     agility: tuple[float, float]
     seen_ns: tuple[int, int]
+    speed_rad_s: float = 0.0
     surprise: tuple[Array, Array] = field(default_factory=lambda: (np.zeros(3), np.zeros(3)))
     streaks: tuple[Streak, Streak] = field(default_factory=lambda: (Streak(), Streak()))
     base: tuple[Base, Base] = field(default_factory=lambda: (Base(), Base()))

@@ -188,7 +188,7 @@ class FusedEstimator:
             return without_joints
         missing = [camera for camera, sighting in zip(CAMERAS, self._last, strict=True) if sighting is None]
         reasons = [self._inputs.why_no_pose(camera, t_ns, needs_encoders=False) for camera in missing]
-        return gravest(*reasons, Reason.STARTING) if reasons else Reason.STARTING
+        return gravest(*reasons) if reasons else Reason.STARTING
 
     def _weakness(self, gh_from_arm: Array, covariance: Array, bridged: bool, drift: DriftReport) -> Reason:
         """Return the gravest reason why angles that are there are not plainly valid."""

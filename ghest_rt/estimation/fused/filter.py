@@ -141,7 +141,8 @@ class FusedFilter:
         tuning = self._tuning
         alike = min(max(float(turn @ belief.surprise[which]) / 3.0, -1.0), 3.0)
         excess = min(max(float(turn @ turn) / 3.0 - _USUAL_NIS, 0.0), 3.0)
-        push = tuning.agility_gain * (alike + excess - tuning.agility_rest)
+        stillness = max(1.0 - belief.speed_rad_s / tuning.still_rad_s, 0.0)
+        push = tuning.agility_gain * (alike + excess - tuning.agility_fall - stillness * tuning.agility_rest)
         agility = min(max(belief.agility[which] * math.exp(push), tuning.least_agility), tuning.most_agility)
         belief.agility = _with(belief.agility, which, agility)
         belief.surprise = _with(belief.surprise, which, turn)

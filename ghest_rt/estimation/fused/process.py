@@ -10,6 +10,8 @@ from ghest_rt.geometry.so3 import Array, exp_so3, quat_wxyz_from_matrix, skew
 
 # A marker not seen for this long is bridged: its body may do what it has not done before.
 _UNSEEN_NS = 80_000_000
+# Over how long the exoskeleton's speed is averaged: encoder steps are no movement.
+_SPEED_MEMORY_S = 0.2
 # Keeps the shortest rotation finite between opposite directions, which no forecast joins.
 _LEAST = 1e-6
 _EYE = np.eye(SIZE)
@@ -58,7 +60,9 @@ class Process:
         p_gh = belief.p_gh + move[GH]
         m0, m1 = belief.e_from_marker
         upper_arm = m1 @ (belief.gh_in_marker[1] - self._elbow_in_m1)
-        follow = follow_encoders(belief, upper_arm, p_gh, e_from_r1)
+        follow, turned_rad = follow_encoders(belief, upper_arm, p_gh, e_from_r1)
+        smoothing = min(dt / _SPEED_MEMORY_S, 1.0)
+        belief.speed_rad_s += smoothing * (turned_rad / dt - belief.speed_rad_s)
         belief.e_from_marker = (exp_so3(move[ACROMION]) @ m0, exp_so3(move[ARM]) @ follow @ m1)
         belief.p_gh = p_gh
         belief.rates = decay * belief.rates
@@ -96,8 +100,8 @@ class Process:
         return max(belief.agility[which], self._bridging[which]) if unseen else belief.agility[which]
 
 
-def follow_encoders(belief: Belief, upper_arm: Array, p_gh: Array, e_from_r1: Array) -> Array:
-    """Return the (3, 3) rotation of the arm that the encoders tell, E axes.
+def follow_encoders(belief: Belief, upper_arm: Array, p_gh: Array, e_from_r1: Array) -> tuple[Array, float]:
+    """Return the (3, 3) rotation of the arm that the encoders tell, E axes, and the angle that camera r1 has turned by, rad.
 
     The elbow keeps its place in camera r1, and so moves with the exoskeleton: that turns the arm's direction, by the shortest
     way. About the arm, the humerus turns with r1.
@@ -118,7 +122,8 @@ def follow_encoders(belief: Belief, upper_arm: Array, p_gh: Array, e_from_r1: Ar
     swing = _EYE_3 + C + C @ C / max(1.0 + ax * bx + ay * by + az * bz, _LEAST)
     w, x, y, z = quat_wxyz_from_matrix(moved).tolist()
     twist = 2.0 * math.atan2(x * ax + y * ay + z * az, w)
-    return np.asarray(swing @ exp_so3(np.array([twist * ax, twist * ay, twist * az])))
+    follow = np.asarray(swing @ exp_so3(np.array([twist * ax, twist * ay, twist * az])))
+    return follow, 2.0 * math.atan2(math.sqrt(x * x + y * y + z * z), w)
 
 
 def _unit(v: Array) -> tuple[float, float, float]:

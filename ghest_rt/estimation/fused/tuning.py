@@ -17,7 +17,9 @@ class Tuning:
         most_agility: The greatest agility, during movement that the model does not foresee.
         bridging_agility: The least agility of m0's and m1's body while the marker is not seen: what it does then is not known.
         agility_gain: How fast the agility follows the innovations.
-        agility_rest: How fast it falls while the innovations are white.
+        agility_fall: How fast it falls while the innovations are white.
+        agility_rest: How much faster while the exoskeleton stands still.
+        still_rad_s: Camera r1 turning slower than this is nearly still.
         forecast_doubt: Factor on the process noise after the newest sighting: nothing corrects a forecast that is published.
         rotation_floor_rad: Added to the standard deviation of every measured rotation.
         position_floor_m: Added to that of every measured position.
@@ -52,12 +54,14 @@ class Tuning:
     rate_memory_s: float = 1.0
     rotation_density: float = 2e-5
     position_density: float = 1e-5
-    least_agility: float = 1.0
+    least_agility: float = 0.2
     starting_agility: float = 100.0
     most_agility: float = 1e6
     bridging_agility: tuple[float, float] = (1000.0, 300.0)
     agility_gain: float = 0.2
-    agility_rest: float = 0.15
+    agility_fall: float = 0.15
+    agility_rest: float = 0.2
+    still_rad_s: float = 0.03
     forecast_doubt: float = 5.0
     rotation_floor_rad: float = math.radians(0.003)
     position_floor_m: float = 3e-6

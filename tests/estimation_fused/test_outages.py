@@ -1,0 +1,116 @@
+"""Blind cameras, silent encoders, wrong poses: bridged as long as that is honest, told when not."""
+
+import itertools
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ghest_rt.geometry.se3 import transform
+from ghest_rt.geometry.so3 import angle_between_rad, exp_so3
+from ghest_rt.messages.results import MarkerObservation, MarkerStatus, Reason, Status
+from tests.estimation_fused.stand import Blind, Judged, Trial, estimator_for, rms_deg, run
+
+FROM_S, TO_S = 2.5, 3.0
+
+
+def during(judged: list[Judged], from_s: float, to_s: float) -> list[Judged]:
+    return [j for j in judged if from_s <= j.t_s < to_s]
+
+
+@pytest.mark.parametrize("frames", [True, False])
+def test_half_a_second_without_m1_is_bridged_by_the_encoders(frames: bool) -> None:
+    judged = run(Trial(duration_s=4.0, blind=(Blind("m1", FROM_S, TO_S, frames),)))
+    bridged = during(judged, FROM_S + 0.1, TO_S)
+    assert all((j.estimate.status, j.estimate.reason) == (Status.DEGRADED, Reason.BRIDGED) for j in bridged)
+    assert max(j.error_deg for j in bridged) < 1.5
+    assert bridged[-1].sigma_deg > 3.0 * judged[int((FROM_S - 0.1) * 66.6)].sigma_deg
+    assert max(j.error_deg / j.sigma_deg for j in bridged) < 2.5
+    assert judged[-1].estimate.status is Status.VALID
+
+
+def test_half_a_second_without_m0_is_bridged_within_the_stated_uncertainty() -> None:
+    judged = run(Trial(duration_s=4.0, blind=(Blind("m0", FROM_S, TO_S),)))
+    bridged = during(judged, FROM_S + 0.1, TO_S)
+    assert all(j.estimate.reason is Reason.BRIDGED for j in bridged)
+    assert max(j.error_deg / j.sigma_deg for j in bridged) < 2.5
+
+
+def test_recovery_does_not_jump_by_more_than_was_stated() -> None:
+    judged = run(Trial(duration_s=4.0, blind=(Blind("m1", FROM_S, TO_S),)))
+    for before, after in itertools.pairwise(judged):
+        if before.t_s > 1.0:
+            assert before.estimate.gh_from_arm is not None
+            assert after.estimate.gh_from_arm is not None
+            step = np.degrees(angle_between_rad(after.estimate.gh_from_arm, before.estimate.gh_from_arm))
+            assert step < 2.5 + 3.0 * before.sigma_deg  # the movement itself makes up to 2 deg between two instants
+
+
+@pytest.mark.parametrize(
+    ("frames", "reason"), [(True, Reason.M0_NOT_SEEN), (False, Reason.R0_NO_FRAMES)], ids=["not seen", "no frames"]
+)
+def test_both_blind_is_lost_when_the_limit_is_reached_and_not_before(frames: bool, reason: Reason) -> None:
+    blind = (Blind("m0", FROM_S, 9.0, frames), Blind("m1", FROM_S, 9.0, frames))
+    judged = run(Trial(duration_s=5.0, blind=blind, estimator={"sigma_limit_deg": 2.0}))
+    lost = [j for j in judged if j.t_s > FROM_S and j.estimate.status is Status.LOST]
+    kept = [j for j in judged if FROM_S + 0.1 < j.t_s < lost[0].t_s]
+    largest = [float(np.degrees(np.sqrt(np.linalg.eigvalsh(j.estimate.covariance)[-1]))) for j in kept]
+    assert max(largest) <= 2.0
+    assert largest[-1] > 1.8
+    assert all(j.estimate.reason is reason and j.error_rad is None for j in lost)
+    assert lost[-1].t_s == judged[-1].t_s
+
+
+def test_nothing_is_bridged_for_ever() -> None:
+    blind = (Blind("m0", 1.0, 99.0), Blind("m1", 1.0, 99.0))
+    judged = run(Trial(duration_s=5.0, blind=blind, estimator={"sigma_limit_deg": 170.0}))
+    assert judged[-1].estimate.status is Status.LOST
+
+
+def spoilt_at(marker: str, frame: int, spoil: Callable[[np.ndarray], np.ndarray]) -> Callable[..., MarkerObservation]:
+    def maybe(observation: MarkerObservation) -> MarkerObservation:
+        if observation.marker != marker or observation.seq != frame or observation.camera_from_marker is None:
+            return observation
+        return replace(observation, camera_from_marker=spoil(observation.camera_from_marker))
+
+    return maybe
+
+
+@pytest.mark.parametrize("marker", ["m0", "m1"])
+def test_a_single_wrong_pose_is_left_aside_and_counted(marker: str) -> None:
+    """The mirror solution of a plane seen from the front: the plate tilted to the other side."""
+    tilted = transform(exp_so3(np.array([0.5, 0.0, 0.0])), np.zeros(3))
+    trial = Trial(duration_s=3.0, spoil=spoilt_at(marker, 90, lambda T: T @ tilted))
+    estimator = estimator_for(trial)
+    judged = run(trial, estimator)
+    assert estimator.counts() == {f"{marker}_outlier": 1}
+    assert rms_deg(judged, 1.3, 2.0) < 0.25
+
+
+def test_weaker_poses_degrade_the_status() -> None:
+    def color_only(observation: MarkerObservation) -> MarkerObservation:
+        return replace(observation, status=MarkerStatus.COLOR_ONLY, depth_used=False)
+
+    judged = run(Trial(duration_s=1.0, spoil=color_only))
+    assert (judged[-1].estimate.status, judged[-1].estimate.reason) == (Status.DEGRADED, Reason.COLOR_ONLY)
+    three = run(Trial(duration_s=1.0, spoil=lambda observation: replace(observation, disks_used=3)))
+    assert three[-1].estimate.reason is Reason.FEWER_DISKS
+    vague = run(Trial(duration_s=1.0, rotation_deg=30.0, position_mm=30.0))
+    assert vague[-1].estimate.status is not Status.VALID
+
+
+def test_before_both_markers_were_seen_it_is_starting_then_says_which_is_missing() -> None:
+    judged = run(Trial(duration_s=3.0, blind=(Blind("m1", 0.0, 9.0, frames=False),)))
+    assert (judged[5].estimate.status, judged[5].estimate.reason) == (Status.LOST, Reason.STARTING)
+    assert (judged[-1].estimate.status, judged[-1].estimate.reason) == (Status.LOST, Reason.R1_NO_FRAMES)
+
+
+def test_without_encoders_there_is_no_estimate() -> None:
+    trial = Trial(duration_s=1.0)
+    estimator = estimator_for(trial)
+    judged = run(trial, estimator)
+    t_ns = judged[-1].estimate.t_sample_ns
+    assert judged[-1].estimate.status is Status.VALID
+    silent = estimator.estimate(t_ns + 300_000_000)
+    assert (silent.status, silent.reason, silent.gh_from_arm) == (Status.LOST, Reason.ENCODERS_SILENT, None)
