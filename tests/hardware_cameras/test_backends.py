@@ -13,6 +13,7 @@ from ghest_drivers.clock import MonotonicClock
 from ghest_drivers.errors import DeviceNotFound, EndOfStream
 from ghest_drivers.factory import make_camera
 from ghest_drivers.hardware import camera_backends
+from ghest_drivers.hardware.cameras.frozen import FrozenWatch
 from ghest_drivers.hardware.supervisor.camera import SupervisedCamera
 from ghest_rt.config.camera_devices import HardwareCameraBackend
 from tests.hardware_cameras.contract_cases import installed
@@ -34,8 +35,9 @@ def settings_of(**device: object) -> dict[str, object]:
 )
 def test_live_cameras_run_in_a_process_of_their_own_unless_told_otherwise(device: dict[str, object]) -> None:
     backend = str(device["backend"])
-    camera = make_camera(backend, "r0", MonotonicClock(), settings_of(**device))
-    assert isinstance(camera, SupervisedCamera)
+    watched: Any = make_camera(backend, "r0", MonotonicClock(), settings_of(**device))
+    assert isinstance(watched, FrozenWatch)
+    assert isinstance(watched.camera, SupervisedCamera)
 
 
 @needs_realsense
@@ -44,8 +46,8 @@ def test_every_realsense_setting_reaches_the_driver() -> None:
         backend="realsense", serial="1", preset="Short Range", laser_power=3, latency_ms=4.5, align=True, record_bag="x.bag",
         color_options={"gain": 3.0}, depth_width_px=320, depth_height_px=240, supervised=False,
     )  # fmt: skip
-    camera: Any = make_camera("realsense", "r0", MonotonicClock(), settings)
-    made = camera._settings
+    watched: Any = make_camera("realsense", "r0", MonotonicClock(), settings)
+    made = watched.camera._settings
     assert (made.preset, made.laser_power, made.latency_ns, made.align) == ("Short Range", 3, 4_500_000, True)
     assert (made.color_options, made.depth_width_px, made.record_bag) == ({"gain": 3.0}, 320, Path("x.bag"))
 
@@ -53,8 +55,8 @@ def test_every_realsense_setting_reaches_the_driver() -> None:
 @needs_oak
 def test_every_oak_setting_reaches_the_driver() -> None:
     settings = settings_of(backend="oak", mxid="18", rate_hz=30, sensitivity_iso=200, exposure_us=4000, supervised=False)
-    camera: Any = make_camera("oak", "r0", MonotonicClock(), settings)
-    made = camera._settings
+    watched: Any = make_camera("oak", "r0", MonotonicClock(), settings)
+    made = watched.camera._settings
     assert (made.rate_hz, made.sensitivity_iso, made.exposure_us, made.width_px) == (30, 200, 4000, 640)
 
 

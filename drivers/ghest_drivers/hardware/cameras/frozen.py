@@ -14,13 +14,16 @@ class FrozenWatch:
 
     Two images of a real sensor are never the same to the last bit: its noise sees to that. Not for ideal simulated sensors.
 
+    Attributes:
+        camera: The camera watched.
+
     Args:
         camera: The camera to watch.
         lost_after: So many repeated images in a row mean that the device hangs: `read` raises DeviceLost.
     """
 
     def __init__(self, camera: RgbdCamera, lost_after: int = _LOST_AFTER) -> None:
-        self._camera = camera
+        self.camera = camera
         self._lost_after = lost_after
         self._last: RgbdFrame | None = None
         self._repeated = 0
@@ -28,12 +31,12 @@ class FrozenWatch:
     @property
     def info(self) -> CameraInfo:
         """See `RgbdCamera.info`."""
-        return self._camera.info
+        return self.camera.info
 
     def open(self) -> None:
         """See `RgbdCamera.open`."""
         self._last, self._repeated = None, 0
-        self._camera.open()
+        self.camera.open()
 
     def read(self, timeout_s: float) -> RgbdFrame:
         """See `RgbdCamera.read`.
@@ -42,7 +45,7 @@ class FrozenWatch:
             BadDeviceData: The image is the one before, to the last bit.
             DeviceLost: So have been the last `lost_after` ones, beside the camera's own reasons.
         """
-        frame = self._camera.read(timeout_s)
+        frame = self.camera.read(timeout_s)
         last, self._last = self._last, frame
         if last is None or not _same_pixels(last, frame):
             self._repeated = 0
@@ -54,7 +57,7 @@ class FrozenWatch:
 
     def close(self) -> None:
         """See `RgbdCamera.close`."""
-        self._camera.close()
+        self.camera.close()
 
 
 def _same_pixels(a: RgbdFrame, b: RgbdFrame) -> bool:
