@@ -2,9 +2,12 @@
 
 import json
 import logging
+import os
 import sys
 
 import numpy as np
+
+from ghest_rt.cli.journal import journal_handler
 
 
 class _StderrHandler(logging.Handler):
@@ -18,9 +21,10 @@ class _StderrHandler(logging.Handler):
 
 
 def set_up_logging(verbose: bool) -> None:
-    """Send the project's log to standard error: warnings and milestones, or everything."""
-    handler = _StderrHandler()
-    handler.setFormatter(logging.Formatter("%(asctime)s %(levelname)-7s %(message)s", "%H:%M:%S"))
+    """Send the project's log to standard error, or to systemd's journal: warnings and milestones, or everything."""
+    handler = journal_handler(os.environ) or _StderrHandler()
+    if isinstance(handler, _StderrHandler):
+        handler.setFormatter(logging.Formatter("%(asctime)s %(levelname)-7s %(message)s", "%H:%M:%S"))
     root = logging.getLogger()
     root.handlers = [handler]
     root.setLevel(logging.WARNING)

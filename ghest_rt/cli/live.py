@@ -46,7 +46,16 @@ class LiveFacts:
 class LiveView:
     """An output of the service that shows itself; drawn on a thread of its own, never in a tick."""
 
-    def __init__(self, console: Console, facts: LiveFacts, scoreboard: Scoreboard) -> None:
+    def __init__(self, console: Console, facts: LiveFacts, scoreboard: Scoreboard, level: int = logging.INFO) -> None:
+        """Prepare.
+
+        Args:
+            console: Where to.
+            facts: What heads the page.
+            scoreboard: Errors against the truth, if there is one.
+            level: Of the lines logged where the console is no terminal.
+        """
+        self._level = level
         self._console = console
         self._facts = facts
         self._scoreboard = scoreboard
@@ -78,7 +87,7 @@ class LiveView:
         """Keep the newest state; without a terminal, log it."""
         self._health = message
         if self._live is None:
-            _log.info("%s", self._line(message))
+            _log.log(self._level, "%s", self._line(message))
 
     def event(self, message: Event) -> None:
         """Keep the newest events."""

@@ -26,6 +26,7 @@ from ghest_rt.service.compose import AnglesComposer, Numbering
 from ghest_rt.service.contract import ServiceSettings
 from ghest_rt.service.inputs import InputSettings
 from ghest_rt.service.loop import Service
+from ghest_rt.service.notify import ServiceManager, service_manager
 from ghest_rt.service.outputs import Output
 from ghest_rt.service.run import run_service
 from ghest_rt.service.stop_signals import StopSignals
@@ -88,10 +89,10 @@ def replay_path(options: ReplayOptions) -> None:
     station = load_station(options.station) if options.station is not None else None
     recordings = open_recordings(options.path)
     reports: list[RunReport] = []
-    with StopSignals() as stop, ExitStack() as stack:
+    with StopSignals() as stop, ExitStack() as stack, service_manager() as manager:
         config = (station or recordings[0].station).config
         publishing = stack.enter_context(Publishing(config.publisher, options.listen, options.publish, lossless=speed is None))
-        player = _Replayer(options, speed, publishing, stop)
+        player = _Replayer(options, speed, publishing, manager, stop)
         while True:
             reports.extend(
                 player.replay(recording, station or recording.station) for recording in recordings if not stop.is_set()
@@ -105,10 +106,18 @@ def replay_path(options: ReplayOptions) -> None:
 class _Replayer:
     """Plays one recording after the other with the same outputs and one numbering."""
 
-    def __init__(self, options: ReplayOptions, speed: float | None, publishing: Publishing, stop: StopSignals) -> None:
+    def __init__(
+        self,
+        options: ReplayOptions,
+        speed: float | None,
+        publishing: Publishing,
+        manager: ServiceManager,
+        stop: StopSignals,
+    ) -> None:
         self._options = options
         self._speed = speed
         self._publishing = publishing
+        self._manager = manager
         self._stop = stop
         self._numbering = Numbering()
         # With --json standard output belongs to the document at the end.
@@ -156,7 +165,7 @@ class _Replayer:
                     encoders=player.encoders(),
                     make_pipeline=lambda infos, joints: self._pipeline(station, infos, joints),
                     composer=self._composer(station, facts.method, time.time_ns() - clock.now_ns()),
-                    outputs=(*outputs, scoreboard, view),
+                    outputs=(*outputs, scoreboard, view, self._manager),
                     clock=clock,
                 )
                 summary = run_service(service, self._stop)
@@ -180,7 +189,7 @@ class _Replayer:
                 estimate_events(events(), pipeline, t_0_ns=recording.grid_t_0_ns),
                 self._composer(station, facts.method, 0),
                 pipeline.lag_ns,
-                (*outputs, scoreboard, view),
+                (*outputs, scoreboard, view, self._manager),
                 self._stop,
             )
         return report_of(recording.path.name, facts.method, counts, scoreboard, recording.problems)

@@ -1,5 +1,6 @@
 """`ghest-rt run`: the service on the devices of a station."""
 
+import logging
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,6 +26,7 @@ from ghest_rt.service.compose import AnglesComposer, Numbering
 from ghest_rt.service.contract import ServiceSettings
 from ghest_rt.service.devices import make_devices, uses_simulation
 from ghest_rt.service.loop import Service
+from ghest_rt.service.notify import service_manager
 from ghest_rt.service.outputs import Output
 from ghest_rt.service.run import run_service
 from ghest_rt.service.stop_signals import StopSignals
@@ -68,6 +70,7 @@ def run_station(options: RunOptions) -> None:
     Raises:
         GhestError: The station file, a device's backend or the endpoint cannot be used.
     """
+    manager = service_manager()
     station = load_station(options.station)
     _refuse_replay(station.config, options.station)
     clock = ScaledClock()
@@ -85,7 +88,10 @@ def run_station(options: RunOptions) -> None:
     ):
         facts = LiveFacts(config.station.id, method, publishing.endpoints, f"ghest/{config.station.id}/gh/angles")
         publisher = publishing.publisher_for(config)
-        with LiveView(Console(stderr=True) if options.as_json else Console(), facts, scoreboard) as view:
+        console = Console(stderr=True) if options.as_json else Console()
+        # systemd shows the state itself.
+        level = logging.DEBUG if manager.present else logging.INFO
+        with LiveView(console, facts, scoreboard, level) as view, manager:
             outputs: list[Output] = [output for output in (publisher, world) if output is not None]
             if recording is not None:
                 cameras, encoders = recording.tap(cameras, encoders)
@@ -98,7 +104,7 @@ def run_station(options: RunOptions) -> None:
                 composer=AnglesComposer(
                     config.station.arm, method, config.calibration.id, time.time_ns() - clock.now_ns(), Numbering()
                 ),
-                outputs=(*outputs, view),
+                outputs=(*outputs, view, manager),
                 clock=clock,
             )
             if recording is not None:

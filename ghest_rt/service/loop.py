@@ -257,7 +257,8 @@ class Service:
             self._event(EventKind.STATUS_CHANGED, severity, "service", f"{message.status} ({message.reason})")
 
     def _event(self, kind: EventKind, severity: Severity, source: str, text: str) -> None:
-        _log.log(_LEVELS[severity], "%s: %s: %s", source, kind.replace("_", " "), text)
+        fields = {"ghest_source": source, "ghest_kind": str(kind)}
+        _log.log(_LEVELS[severity], "%s: %s: %s", source, kind.replace("_", " "), text, extra=fields)
         t_ns = self._clock.now_ns()
         message = Event(
             seq=self._composer.numbering.take("events"),
