@@ -68,6 +68,14 @@ def test_nothing_is_bridged_for_ever() -> None:
     assert judged[-1].estimate.status is Status.LOST
 
 
+def test_after_a_long_outage_of_everything_it_is_as_good_as_before() -> None:
+    blind = (Blind("m0", 1.0, 5.0, frames=False), Blind("m1", 1.0, 5.0, frames=False))
+    judged = run(Trial(duration_s=6.5, blind=blind))
+    assert judged[int(4.8 * 66.6)].estimate.status is Status.LOST
+    assert judged[-1].estimate.status is Status.VALID
+    assert rms_deg(judged, 5.2) < 0.25
+
+
 def spoilt_at(marker: str, frame: int, spoil: Callable[[np.ndarray], np.ndarray]) -> Callable[..., MarkerObservation]:
     def maybe(observation: MarkerObservation) -> MarkerObservation:
         if observation.marker != marker or observation.seq != frame or observation.camera_from_marker is None:

@@ -87,7 +87,7 @@ class Tuning:
     calibrated_rad: float = math.radians(0.3)
     exact_m: float = 2e-5
     exact_rad: float = math.radians(0.005)
-    slide_cost: float = 6.0
-    turn_cost: float = 9.0
+    slide_cost: float = 12.0
+    turn_cost: float = 15.0
     arm_length_m: float = 1e-3
     unknown_arm_length_m: float = 0.05
