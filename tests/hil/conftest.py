@@ -37,10 +37,15 @@ def rig(request: pytest.FixtureRequest, hil_folder: Path) -> Iterator[Rig]:
         if station is not None:
             yield stack.enter_context(station_rig(station))
             return
-        for module, extra in _NEEDS[request.param].items():
-            if importlib.util.find_spec(module) is None:
-                pytest.skip(f"{request.param} needs {module}: install ghest-rt[{extra}]")
+        skip_without_libraries(request.param)
         yield stack.enter_context(fixture_rig(request.param, hil_folder))
+
+
+def skip_without_libraries(name: str) -> None:
+    """Skip a test whose fixtures need a library that is not installed."""
+    for module, extra in _NEEDS[name].items():
+        if importlib.util.find_spec(module) is None:
+            pytest.skip(f"{name} needs {module}: install ghest-rt[{extra}]")
 
 
 def _station(config: pytest.Config) -> Path | None:

@@ -117,8 +117,8 @@ class Rig:
 
 
 @contextmanager
-def fixture_rig(name: str, folder: Path) -> Iterator[Rig]:
-    """Run the service on fixtures: "realsense-serial" or "oak-can"."""
+def fixture_rig(name: str, folder: Path, record_to: Path | None = None) -> Iterator[Rig]:
+    """Run the service on fixtures, "realsense-serial" or "oak-can"; with `record_to`, as `ghest-rt record` does."""
     if not (folder / "scene.npz").exists():
         write_scene(folder, time.monotonic_ns())
     station = folder / f"{name}.toml"
@@ -130,7 +130,8 @@ def fixture_rig(name: str, folder: Path) -> Iterator[Rig]:
     )
     try:
         assert talker.stdout is not None and talker.stdout.readline() == "ready\n"
-        command = [sys.executable, "-m", "tests.hil.service", "run", "--station", str(station)]
+        doing = ["run"] if record_to is None else ["record", "--out", str(record_to)]
+        command = [sys.executable, "-m", "tests.hil.service", *doing, "--station", str(station)]
         with _running(name, command, environment, folder, read_scene(folder)) as rig:
             yield rig
     finally:

@@ -60,7 +60,6 @@ def test_the_angles_are_those_of_the_patient(rig: Rig, heard: list[Sample]) -> N
     assert np.percentile(errors, 95) < 0.5
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.name)
 def test_a_fault_is_told_and_mended_and_nothing_stale_passes_for_fresh(rig: Rig, fault: Fault) -> None:
     if rig.scene is None:

@@ -1,6 +1,9 @@
 """`ghest-rt record` as a user runs it, on the simulated station."""
 
 import json
+import subprocess
+import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -36,3 +39,22 @@ def test_a_folder_that_cannot_be_made_is_bad_input(ghest_rt: Run, tmp_path: Path
     ended = ghest_rt("record", "--station", STATION, "--out", tmp_path / "file", "--no-publish")
     assert ended.returncode == 2
     assert "name another folder" in ended.stderr and "Traceback" not in ended.stderr
+
+
+def test_what_a_killed_command_has_recorded_can_be_estimated(ghest_rt: Run, tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "ghest_rt.cli.main", "record", "--station", STATION, "--out", tmp_path, "--no-publish"]
+    recorder = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    try:
+        deadline_s = time.monotonic() + 30.0
+        while sum(file.stat().st_size for file in tmp_path.glob("*.mcap")) < 8_000_000:
+            assert time.monotonic() < deadline_s
+            time.sleep(0.05)
+    finally:
+        recorder.kill()
+        recorder.wait(10)
+    (path,) = tmp_path.glob("*.mcap")
+    table = tmp_path / "angles.csv"
+    estimated = ghest_rt("estimate", path, "--out", table, "--json")
+    assert estimated.returncode == 0, estimated.stderr
+    assert any("used up to there" in problem for problem in json.loads(estimated.stdout)["skipped"])
+    assert len(table.read_text().splitlines()) > 20

@@ -1,0 +1,60 @@
+"""What `ghest-rt record` writes from devices gives the angles that were published live."""
+
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ghest_rt.estimation.offline import estimate_events
+from ghest_rt.estimation.pipeline import Pipeline
+from ghest_rt.geometry.so3 import quat_wxyz_from_matrix
+from ghest_rt.messages.results import GhEstimate
+from ghest_rt.recording.reader import Recording
+from tests.hil.conftest import skip_without_libraries
+from tests.hil.rig import FIXTURES, Sample, fixture_rig
+
+
+@pytest.mark.parametrize("name", FIXTURES)
+def test_a_recording_from_devices_gives_the_angles_published_live(
+    name: str, hil_folder: Path, tmp_path: Path, request: pytest.FixtureRequest
+) -> None:
+    if request.config.getoption("--station", None) is not None:
+        pytest.skip("made on fixtures only")
+    skip_without_libraries(name)
+    with fixture_rig(name, hil_folder, record_to=tmp_path) as rig:
+        rig.inject(("r0",), "drops", 0.5)
+        time.sleep(1.0)
+        rig.inject(("encoders",), "crc_errors", 0.2)
+        time.sleep(2.0)
+        assert rig.stop() == 0
+        live = [sample for sample in rig.subscriber.angles if sample.valid]
+        skipped = sum(item["skipped"] for item in rig.subscriber.healths[-1].body["inputs"].values())
+    (path,) = tmp_path.glob("*.mcap")
+    recording = Recording(path)
+    assert recording.problems == []
+    pipeline = Pipeline(recording.station, recording.camera_infos, recording.encoder_joints)
+    again = {
+        estimate.t_sample_ns: estimate
+        for estimate in estimate_events(recording.events(), pipeline, t_0_ns=recording.grid_t_0_ns)
+    }
+    same_inputs = [sample for sample in live if inputs(sample) == again[sample.body["t_sample_ns"]].newest_ns]
+    # Not all: off line a frame counts from its arrival on, live when vision is through with it.
+    assert len(same_inputs) > 0.6 * len(live) > 60
+    errors = [difference(sample, again[sample.body["t_sample_ns"]]) for sample in same_inputs]
+    if skipped == 0:
+        assert np.mean([error == 0.0 for error in errors]) > 0.95
+    # A frame that vision passed over live, but not off line, is where the search for the next one starts from.
+    assert np.percentile(errors, 95) < 1e-5
+
+
+def inputs(sample: Sample) -> dict[str, int]:
+    """Capture times of the newest inputs of a published sample."""
+    published_ns = sample.body["t_publish_ns"]
+    return {name: round(published_ns - age_ms * 1e6) for name, age_ms in sample.body["age_ms"].items()}
+
+
+def difference(sample: Sample, estimate: GhEstimate) -> float:
+    """Return the largest difference between the parts of two quaternions."""
+    assert estimate.gh_from_arm is not None
+    return float(np.abs(quat_wxyz_from_matrix(estimate.gh_from_arm) - sample.body["quaternion_wxyz"]).max())
