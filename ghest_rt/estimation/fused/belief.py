@@ -8,17 +8,18 @@ import numpy as np
 from ghest_rt.geometry.se3 import transform
 from ghest_rt.geometry.so3 import Array, exp_so3
 
-# The error state, in this order, all in E axes but the last two. Rotation errors are left perturbations: true = exp(error) R.
+# The error state, in this order, all in E axes but the GH centre in the markers. Rotation errors are left perturbations: true =
+# exp(error) R.
 ACROMION = slice(0, 3)
 GH = slice(3, 6)
 ARM = slice(6, 9)
 POSES = slice(0, 9)
-ACROMION_RATE = slice(9, 12)
-GH_RATE = slice(12, 15)
-ARM_RATE = slice(15, 18)
-RATES = slice(9, 18)
-GH_IN_MARKER = (slice(18, 21), slice(21, 24))
-BOTH_GH = slice(18, 24)
+GH_IN_MARKER = (slice(9, 12), slice(12, 15))
+BOTH_GH = slice(9, 15)
+ACROMION_RATE = slice(15, 18)
+GH_RATE = slice(18, 21)
+ARM_RATE = slice(21, 24)
+RATES = slice(15, 24)
 SIZE = 24
 
 _EYE_3 = np.eye(3)

@@ -16,7 +16,8 @@ LENGTH = 12
 DRIFT_SIZE = 13
 # What a posture consists of: scapula, GH centre, humerus, drift.
 _POSTURE = 9
-_ROWS = np.r_[0:9, 18:24]
+# Of the belief's error states, those that a posture depends on: poses, and the GH centre in the markers.
+_KNOWN = 15
 # An answer this unlikely is left out.
 _NEGLIGIBLE = 2e-2
 # The answers are weighed this often.
@@ -147,14 +148,14 @@ class DriftJudge:
 
     def _posture(self, belief: Belief, explained: "_Explained", h: int, found: Array) -> tuple[Array, Array]:
         """Return the (22,) shift and (22, 22) covariance of the posture if answer `h` is the right one."""
-        columns = belief.P[_ROWS, BOTH_GH]
+        columns = belief.P[:_KNOWN, BOTH_GH]
         gain = np.linalg.solve(columns[9:] + explained.spread[h], columns.T).T
         shift = -(gain @ found)
-        P = belief.P[np.ix_(_ROWS, _ROWS)] - gain @ columns.T
+        P = belief.P[:_KNOWN, :_KNOWN] - gain @ columns.T
         W = explained.W[h]
         m0, m1 = belief.e_from_marker
         # Errors of the posture from those of the poses and of the GH centre in the markers, and from what W leaves open.
-        B, M = np.zeros((_POSTURE + DRIFT_SIZE, 15)), np.zeros((_POSTURE + DRIFT_SIZE, DRIFT_SIZE))
+        B, M = np.zeros((_POSTURE + DRIFT_SIZE, _KNOWN)), np.zeros((_POSTURE + DRIFT_SIZE, DRIFT_SIZE))
         B[POSES, POSES] = np.eye(9)
         M[ACROMION, TURN[0]], M[ARM, TURN[1]] = -m0, -m1
         M[_POSTURE:] = np.eye(DRIFT_SIZE)

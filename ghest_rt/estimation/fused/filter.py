@@ -116,7 +116,7 @@ class FusedFilter:
             update = _Update(freed, innovation, sighting.covariance)
         update.apply(belief)
         if outcome is Outcome.TAKEN:
-            self._adapt(belief, which, foretold.surprise[:3])
+            self._adapt(belief, which, foretold.turn_surprise())
         belief.streaks = _with(belief.streaks, which, Streak())
         belief.seen_ns = _with(belief.seen_ns, which, sighting.t_ns)
         return outcome
@@ -177,26 +177,24 @@ class _Update:
 
     def __init__(self, P: Array, innovation: Innovation, R: Array) -> None:
         H = innovation.H
-        self._P = P
-        self._residual = innovation.residual
-        self._H_P = H @ P
         noise = R.copy()
         noise[_POSITION, _POSITION] += innovation.bend_m2
-        S = self._H_P @ H.T + noise
-        self.spread = S
-        self._H, self._noise = H, noise
-        self._root = np.linalg.cholesky(S)
+        self._P, self._H, self._H_P, self._noise = P, H, H @ P, noise
+        self._residual = innovation.residual
         self._without_rotation = innovation.without_rotation
-        self.surprise = np.linalg.solve(self._root, innovation.residual)
-        self.nis = float(self.surprise @ self.surprise)
+        self.spread = self._H_P @ H.T + noise
+        self._information = np.linalg.inv(self.spread)
+        self.nis = float(self._residual @ self._information @ self._residual)
+
+    def turn_surprise(self) -> Array:
+        """Return the (3,) innovation of the rotation, whitened."""
+        return np.linalg.solve(np.linalg.cholesky(self.spread[:3, :3]), self._residual[:3])
 
     def apply(self, belief: Belief) -> None:
         """Correct a belief."""
-        T, S, H_P = self._without_rotation, self.spread, self._H_P
-        gain = np.linalg.solve(S, H_P).T
-        T_H_P = T @ H_P
-        apart = np.linalg.solve(T @ S @ T.T, T_H_P).T @ T
-        gain[_PLACES] = apart[_PLACES]
+        T, H_P = self._without_rotation, self._H_P
+        gain = (self._information @ H_P).T
+        gain[_PLACES] = ((T.T @ np.linalg.inv(T @ self.spread @ T.T)) @ (T @ H_P)).T[_PLACES]
         kept = _EYE - gain @ self._H
         P = kept @ self._P @ kept.T + gain @ self._noise @ gain.T
         belief.P = 0.5 * (P + P.T)

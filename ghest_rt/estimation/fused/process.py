@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from ghest_rt.estimation.fused.belief import ACROMION, ARM, BOTH_GH, GH, GH_IN_MARKER, GH_RATE, SIZE, Belief
+from ghest_rt.estimation.fused.belief import ACROMION, ARM, BOTH_GH, GH, GH_IN_MARKER, GH_RATE, POSES, RATES, SIZE, Belief
 from ghest_rt.estimation.fused.tuning import Tuning
 from ghest_rt.geometry.so3 import Array, exp_so3, quat_wxyz_from_matrix, skew
 
@@ -16,8 +16,10 @@ _SPEED_MEMORY_S = 0.2
 _LEAST = 1e-6
 _EYE = np.eye(SIZE)
 _EYE_3 = np.eye(3)
-# From one element of the diagonal to the next in the flat covariance.
-_STEP = SIZE + 1
+# Diagonals of blocks in the flat covariance.
+_POSE, _GH, _RATE = (slice(part.start * (SIZE + 1), part.stop * (SIZE + 1), SIZE + 1) for part in (POSES, BOTH_GH, RATES))
+_POSE_RATE = slice(RATES.start, RATES.start + 9 * (SIZE + 1), SIZE + 1)
+_RATE_POSE = slice(RATES.start * SIZE, RATES.start * SIZE + 9 * (SIZE + 1), SIZE + 1)
 
 
 class Process:
@@ -69,8 +71,8 @@ class Process:
         belief.e_from_r1 = e_from_r1
         F = _EYE.copy()
         diagonal = F.ravel()
-        diagonal[9 : 9 * _STEP : _STEP] = carry
-        diagonal[9 * _STEP : 18 * _STEP : _STEP] = decay
+        diagonal[_POSE_RATE] = carry
+        diagonal[_RATE] = decay
         F[ARM, ARM] = follow
         F[ARM, GH_RATE] = skew((carry / float(upper_arm @ upper_arm)) * upper_arm)
         belief.P = F @ belief.P @ F.T
@@ -86,12 +88,12 @@ class Process:
         density[:6] *= self._agility(belief, 0, t_ns)
         density[6:] *= self._agility(belief, 1, t_ns)
         diagonal = belief.P.ravel()
-        diagonal[0 : 9 * _STEP : _STEP] += (tau * tau * (dt - 2.0 * carry + fresh)) * density
-        diagonal[9 * _STEP : 18 * _STEP : _STEP] += fresh * density
+        diagonal[_POSE] += (tau * tau * (dt - 2.0 * carry + fresh)) * density
+        diagonal[_RATE] += fresh * density
         cross = (0.5 * carry * carry) * density
-        diagonal[9 : 9 * _STEP : _STEP] += cross
-        diagonal[9 * (_STEP - 1) : 18 * _STEP - 9 : _STEP] += cross
-        creep = diagonal[18 * _STEP :: _STEP]
+        diagonal[_POSE_RATE] += cross
+        diagonal[_RATE_POSE] += cross
+        creep = diagonal[_GH]
         if creep.max() < self._most:
             creep += dt * self._creep
 
