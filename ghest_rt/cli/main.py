@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from ghest_rt.cli.options import MarkerTexture, Method, Movement, Sensor, Side
+from ghest_rt.cli.options import Faults, MarkerTexture, Method, Movement, Sensor, Shifts, Side, SoftTissue, Turns
 from ghest_rt.errors import GhestError
 
 app = typer.Typer(
@@ -173,6 +173,12 @@ def simulate(
         Path | None,
         typer.Option(metavar="FILE", help="Station file of your own instead of the shipped one", show_default=False),
     ] = None,
+    marker_shift: Shifts = None,
+    marker_turn: Turns = None,
+    soft_tissue: Annotated[
+        SoftTissue, typer.Option(help="Skin that moves the markers on the bones (docs/disturbances.md)")
+    ] = SoftTissue.NONE,
+    fault: Faults = None,
     as_json: _Json = False,
 ) -> None:
     """Record a simulated patient in the exoskeleton, with the true angles (needs the extra 'sim')."""
@@ -181,7 +187,10 @@ def simulate(
     need_simulation()
     from ghest_rt.cli.simulate import simulate_recording
     from ghest_rt.simulation.command import SimulateOptions
+    from ghest_rt.simulation.disturbances import parse_shift, parse_turn
+    from ghest_rt.simulation.faults import parse_fault
 
+    shifts, turns = map(parse_shift, marker_shift or ()), map(parse_turn, marker_turn or ())
     simulate_recording(
         SimulateOptions(
             out=out,
@@ -194,6 +203,9 @@ def simulate(
             height_m=height_m,
             marker=marker.value,
             station=station,
+            marker_moves=(*shifts, *turns),
+            soft_tissue=soft_tissue.value,
+            faults=tuple(map(parse_fault, fault or ())),
         ),
         as_json,
     )
@@ -289,6 +301,34 @@ def doctor(
     code = run_doctor(station, live_s, as_json)
     if code:
         raise typer.Exit(code)
+
+
+@app.command("install-service")
+def install_service(
+    station: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Station file to install; without, the installed one is kept", show_default=False),
+    ] = None,
+    name: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Of this station, if the machine has several", show_default=False)
+    ] = None,
+    uninstall: Annotated[bool, typer.Option("--uninstall", metavar="", help="Undo the installation")] = False,
+    dry_run: Annotated[bool, typer.Option("--dry-run", metavar="", help="Only show what would be done")] = False,
+    cpus: Annotated[
+        str | None, typer.Option(metavar="LIST", help="Run the service on these CPUs only, for example 2-3", show_default=False)
+    ] = None,
+    executable: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="The ghest-rt that the unit starts, if not this one", show_default=False)
+    ] = None,
+    root_dir: Annotated[
+        Path, typer.Option("--root", metavar="FOLDER", help="Install into an image of a system; nothing is started")
+    ] = Path("/"),
+) -> None:
+    """Make a station a service of systemd that starts with the machine, or undo it (as root)."""
+    from ghest_rt.cli.install_service.command import InstallOptions
+    from ghest_rt.cli.install_service.command import install_service as install
+
+    install(InstallOptions(station, name, cpus, executable, root_dir, uninstall, dry_run))
 
 
 def main() -> None:

@@ -7,7 +7,9 @@ from ghest_rt.config.station import StationConfig
 from ghest_rt.geometry.se3 import inverse, transform
 from ghest_rt.geometry.so3 import Array
 from ghest_rt.messages.results import TruthSample
+from ghest_rt.simulation.attachment import Attachment
 from ghest_rt.simulation.coupling import ExoskeletonMotion
+from ghest_rt.simulation.disturbances import MARKERS
 from ghest_rt.simulation.posture import Motion
 from ghest_rt.simulation.scene import Scene
 
@@ -20,12 +22,21 @@ class Clinic:
         station: Where the cameras are.
         motion: What the patient does.
         exoskeleton: How the exoskeleton follows.
+        attachment: Where the markers are; None where the calibration says.
     """
 
-    def __init__(self, scene: Scene, station: StationConfig, motion: Motion, exoskeleton: ExoskeletonMotion) -> None:
+    def __init__(
+        self,
+        scene: Scene,
+        station: StationConfig,
+        motion: Motion,
+        exoskeleton: ExoskeletonMotion,
+        attachment: Attachment | None = None,
+    ) -> None:
         self.scene = scene
         self._motion = motion
         self._exoskeleton = exoskeleton
+        self._attachment = attachment
         self._addresses = [scene.joint_address[name] for name in exoskeleton.names]
         self._cameras = {
             name: (scene.model.body(camera.link).id, station.calibration.link_from_camera_array(name))
@@ -35,6 +46,8 @@ class Clinic:
             "m0": (scene.model.body("scapula").id, scene.scapula_from_m0),
             "m1": (scene.model.body("humerus").id, scene.humerus_from_m1),
         }
+        if attachment is not None:
+            self._markers = {name: (body, np.eye(4)) for name, (body, _) in scene.mounts.items()}
         self._humerus = scene.model.body("humerus").id
         self._scapula = scene.model.body("scapula").id
         self._arm_in_humerus = transform(np.eye(3), (0.0, 0.0, -scene.anatomy.upper_arm_m / 2))
@@ -55,8 +68,12 @@ class Clinic:
 
     def place(self, data: mujoco.MjData, t_s: float) -> None:
         """Put everything in `data` where it is at `t_s` of the movement."""
-        self.scene.pose_patient(data, self._motion.at(t_s))
+        posture = self._motion.at(t_s)
+        self.scene.pose_patient(data, posture)
         data.qpos[self._addresses] = self._exoskeleton.at(t_s)
+        if self._attachment is not None:
+            for marker in MARKERS:
+                self.scene.move_plate(data, marker, self._attachment.nominal_from_marker(marker, t_s, posture))
         mujoco.mj_kinematics(self.scene.model, data)
 
     def e_from_camera(self, data: mujoco.MjData, camera: str) -> Array:

@@ -2,9 +2,9 @@
 
 import shlex
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import Literal
@@ -15,12 +15,15 @@ from ghest_rt.config.shipped import shipped_config_dir
 from ghest_rt.errors import BadInputError
 from ghest_rt.recording.writer import RecordingWriter
 from ghest_rt.simulation.anatomy import anatomy
+from ghest_rt.simulation.disturbances import MarkerMove, SoftTissueName
+from ghest_rt.simulation.faults import DeviceFault, FaultyDevices
 from ghest_rt.simulation.fitting import fit_station
 from ghest_rt.simulation.imaging import Light
 from ghest_rt.simulation.opensim_file import read_motion_table
 from ghest_rt.simulation.opensim_motion import OpenSimMotion
 from ghest_rt.simulation.posture import Motion
 from ghest_rt.simulation.sensors import find_sensors
+from ghest_rt.simulation.soft_tissue import find_soft_tissue
 from ghest_rt.simulation.texture import MarkerTexture
 from ghest_rt.simulation.therapy import TherapyMotion, find_movement
 from ghest_rt.simulation.world import World
@@ -51,6 +54,9 @@ class SimulateOptions:
         brightness: Factor on the light in the room.
         white_balance: Factors on red, green and blue.
         station: A station file of your own; None for the shipped one of this sensor and arm.
+        marker_moves: Markers that are not where the calibration says.
+        soft_tissue: How skin moves the markers.
+        faults: What the devices fail to deliver.
     """
 
     out: Path
@@ -65,6 +71,9 @@ class SimulateOptions:
     brightness: float = 1.0
     white_balance: tuple[float, float, float] = (1.0, 1.0, 1.0)
     station: Path | None = None
+    marker_moves: tuple[MarkerMove, ...] = ()
+    soft_tissue: SoftTissueName = "none"
+    faults: tuple[DeviceFault, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,7 +100,7 @@ class SimulationSummary:
 
 
 def build_world(options: SimulateOptions) -> World:
-    """Set up the simulated clinic that `options` describe (`out` is not used).
+    """Set up the simulated clinic that `options` describe (`out` and `faults` are not used).
 
     Raises:
         BadInputError: An option, the station file or the motion file cannot be used.
@@ -118,6 +127,8 @@ def build_world(options: SimulateOptions) -> World:
         texture=options.marker,
         light=Light(options.brightness, options.white_balance),
         duration_s=options.duration_s,
+        marker_moves=options.marker_moves,
+        soft_tissue=find_soft_tissue(options.soft_tissue),
     )
 
 
@@ -129,6 +140,7 @@ def simulate(options: SimulateOptions, progress: Callable[[float], None]) -> Sim
         GhestError: The exoskeleton cannot follow the movement.
     """
     world = build_world(options)
+    devices = FaultyDevices(options.faults, world.camera_names, options.seed)
     name = _motion_name(options)
     facts = {
         "created_by": f"ghest-rt {version('ghest-rt')}",
@@ -137,23 +149,27 @@ def simulate(options: SimulateOptions, progress: Callable[[float], None]) -> Sim
         "sensor": options.sensor,
         "seed": str(options.seed),
         "height_m": str(options.height_m),
+        **_disturbances(options),
     }
     first_ns = min(world.encoder_arrival_ns(0), world.truth_times_ns[0])
-    events = _events(world)
+    deliveries = {camera: _deliveries(world, devices, camera) for camera in world.camera_names}
+    events = _events(world, deliveries)
     with (
         RecordingWriter(options.out, world.station, facts) as writer,
         ThreadPoolExecutor(max_workers=len(world.camera_names)) as pool,
     ):
         for camera in world.camera_names:
             writer.add_camera(world.camera_info(camera), first_ns)
-        frames = {camera: _render_ahead(world, camera, pool) for camera in world.camera_names}
+        frames = {camera: _render_ahead(world, devices, camera, given, pool) for camera, given in deliveries.items()}
         names = world.encoder_info().joint_names
+        rows = 0
         for done, (_, kind, k) in enumerate(events):
             if kind == "truth":
                 writer.write_truth(world.truth_at(world.truth_times_ns[k]))
             elif kind == "encoders":
                 sample = world.encoder_sample(k)
-                if sample is not None:
+                if sample is not None and devices.delivers_encoders(world.timeline.movement_s(sample.t_capture_ns)):
+                    rows += 1
                     writer.write_encoder(sample, names)
             else:
                 writer.write_frame(next(frames[kind]))
@@ -163,31 +179,58 @@ def simulate(options: SimulateOptions, progress: Callable[[float], None]) -> Sim
         out=options.out,
         motion=name,
         duration_s=world.timeline.duration_s,
-        frames={camera: world.frame_count(camera) for camera in world.camera_names},
-        encoder_samples=world.encoder_count,
+        frames={camera: len(given) for camera, given in deliveries.items()},
+        encoder_samples=rows,
         truth_samples=len(world.truth_times_ns),
         size_bytes=options.out.stat().st_size,
     )
 
 
-def _events(world: World) -> list[tuple[int, str, int]]:
+@dataclass(frozen=True, slots=True)
+class _Delivery:
+    """A frame that is delivered: its number and when."""
+
+    k: int
+    arrival_ns: int
+
+
+def _deliveries(world: World, devices: FaultyDevices, camera: str) -> list[_Delivery]:
+    """Return the frames that a camera delivers, in their order: behind a late one the next wait."""
+    deliveries: list[_Delivery] = []
+    latest_ns = 0
+    for k in range(world.frame_count(camera)):
+        if devices.delivers_frame(camera, k):
+            on_time_ns = world.frame_times(camera, k).arrival_ns
+            latest_ns = max(latest_ns, on_time_ns + round(devices.delay_s(camera, k) * 1e9))
+            deliveries.append(_Delivery(k, latest_ns))
+    return deliveries
+
+
+def _events(world: World, deliveries: dict[str, list[_Delivery]]) -> list[tuple[int, str, int]]:
     """Return (arrival time, source, number) of everything to be written, in order of arrival."""
     events = [(t_ns, "truth", k) for k, t_ns in enumerate(world.truth_times_ns)]
     events += [(world.encoder_arrival_ns(k), "encoders", k) for k in range(world.encoder_count)]
-    for camera in world.camera_names:
-        events += [(world.frame_times(camera, k).arrival_ns, camera, k) for k in range(world.frame_count(camera))]
+    for camera, given in deliveries.items():
+        events += [(delivery.arrival_ns, camera, delivery.k) for delivery in given]
     return sorted(events)
 
 
-def _render_ahead(world: World, camera: str, pool: ThreadPoolExecutor) -> Iterator[RgbdFrame]:
+def _render_ahead(
+    world: World, devices: FaultyDevices, camera: str, deliveries: Sequence[_Delivery], pool: ThreadPoolExecutor
+) -> Iterator[RgbdFrame]:
     """Yield a camera's frames in order, one after another on the pool, a few ahead of the writer."""
 
     def render(first: int) -> list[RgbdFrame]:
-        block = (world.frame(camera, k) for k in range(first, first + _LOOK_AHEAD))
-        return [frame for frame in block if frame is not None]
+        block: list[RgbdFrame] = []
+        for delivery in deliveries[first : first + _LOOK_AHEAD]:
+            frame = world.frame(camera, delivery.k)
+            if frame is not None:
+                frame = replace(frame, t_arrival_ns=delivery.arrival_ns)
+                block.append(devices.spoil(frame, world.timeline.movement_s(frame.t_capture_ns)))
+        return block
 
     waiting: deque[Future[list[RgbdFrame]]] = deque()
-    starts = iter(range(0, world.frame_count(camera), _LOOK_AHEAD))
+    starts = iter(range(0, len(deliveries), _LOOK_AHEAD))
     for start in starts:
         waiting.append(pool.submit(render, start))
         break
@@ -197,6 +240,17 @@ def _render_ahead(world: World, camera: str, pool: ThreadPoolExecutor) -> Iterat
             waiting.append(pool.submit(render, start))
             break
         yield from block
+
+
+def _disturbances(options: SimulateOptions) -> dict[str, str]:
+    """Return the recording's facts about what goes wrong: none if nothing does."""
+    given: dict[str, list[str]] = {
+        "marker_shift": [move.text for move in options.marker_moves if move.kind == "shift"],
+        "marker_turn": [move.text for move in options.marker_moves if move.kind == "turn"],
+        "soft_tissue": [] if options.soft_tissue == "none" else [options.soft_tissue],
+        "fault": [fault.text for fault in options.faults],
+    }
+    return {name: " ".join(texts) for name, texts in given.items() if texts}
 
 
 def _station(options: SimulateOptions) -> LoadedStation:
@@ -235,4 +289,10 @@ def _command(options: SimulateOptions) -> str:
         words += ["--height", f"{options.height_m:g}"]
     if options.marker != "disks":
         words += ["--marker", options.marker]
+    for move in options.marker_moves:
+        words += [f"--marker-{move.kind}", move.text]
+    if options.soft_tissue != "none":
+        words += ["--soft-tissue", options.soft_tissue]
+    for fault in options.faults:
+        words += ["--fault", fault.text]
     return shlex.join([*words, "--out", options.out.name])

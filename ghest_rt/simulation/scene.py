@@ -1,6 +1,6 @@
 """The MuJoCo model of the clinic: exoskeleton (from its URDF), patient, marker plates, room. World frame = E."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 import mujoco
@@ -58,6 +58,7 @@ class Scene:
         scapula_from_m0: (4, 4) marker plate on the scapula body (origin: GH centre).
         humerus_from_m1: (4, 4) marker plate on the humerus body (origin: GH centre).
         m0_from_gh: (4, 4) what calibration says, eq. (8).
+        mounts: By marker, if plates are movable: the plate's own body and the place of its 7 coordinates in qpos.
     """
 
     model: mujoco.MjModel
@@ -67,6 +68,7 @@ class Scene:
     scapula_from_m0: Array
     humerus_from_m1: Array
     m0_from_gh: Array
+    mounts: dict[str, tuple[int, int]] = field(default_factory=dict)
 
     def pose_patient(self, data: mujoco.MjData, posture: Posture) -> None:
         """Write a posture (told for the right arm) into `data.qpos`, mirrored for a left arm."""
@@ -85,15 +87,21 @@ class Scene:
         q[17:19] = posture.elbow_rad
         q[19:21] = posture.wrist_rad
 
+    def move_plate(self, data: mujoco.MjData, marker: str, nominal_from_marker: Array) -> None:
+        """Write the (4, 4) pose of a movable plate, seen from where the calibration has it, into `data.qpos`."""
+        _, address = self.mounts[marker]
+        data.qpos[address : address + 3] = nominal_from_marker[:3, 3]
+        data.qpos[address + 3 : address + 7] = quat_wxyz_from_matrix(nominal_from_marker[:3, :3])
+
     @property
     def _patient(self) -> int:
         return int(self.model.joint("patient_thorax").qposadr[0])
 
 
-def build_scene(station: StationConfig, urdf_text: str, source: str, body: Anatomy) -> Scene:
+def build_scene(station: StationConfig, urdf_text: str, source: str, body: Anatomy, *, movable_plates: bool = False) -> Scene:
     """Build the clinic described by a station file, with a patient in it.
 
-    The markers sit exactly where the station's calibration says.
+    The markers sit exactly where the station's calibration says, or can be moved from there.
 
     Raises:
         BadInputError: The URDF cannot be simulated.
@@ -110,8 +118,8 @@ def build_scene(station: StationConfig, urdf_text: str, source: str, body: Anato
     _add_room(spec)
     builder = _PatientBuilder(spec, body, side)
     builder.add()
-    builder.add_plate("scapula", "m0", scapula_from_m0, station.markers["m0"].plate_m)
-    builder.add_plate("humerus", "m1", humerus_from_m1, station.markers["m1"].plate_m)
+    for marker, bone, bone_from_marker in (("m0", "scapula", scapula_from_m0), ("m1", "humerus", humerus_from_m1)):
+        builder.add_plate(bone, marker, bone_from_marker, station.markers[marker].plate_m, movable=movable_plates)
     model = spec.compile()
     return Scene(
         model=model,
@@ -121,7 +129,12 @@ def build_scene(station: StationConfig, urdf_text: str, source: str, body: Anato
         scapula_from_m0=scapula_from_m0,
         humerus_from_m1=humerus_from_m1,
         m0_from_gh=m0_from_gh,
+        mounts={marker: _mount(model, marker) for marker in PLATE_GROUPS} if movable_plates else {},
     )
+
+
+def _mount(model: mujoco.MjModel, marker: str) -> tuple[int, int]:
+    return int(model.body(f"{marker}_mount").id), int(model.joint(f"{marker}_slide_x").qposadr[0])
 
 
 def _add_room(spec: mujoco.MjSpec) -> None:
@@ -178,10 +191,15 @@ class _PatientBuilder:
         self._hinge(hand, "patient_wrist_deviation", (0.0, 1.0, 0.0))
         self._capsule(hand, (0.0, 0.0, -0.03 * s), (0.0, 0.0, -0.7 * b.hand_m), 0.026 * s, _SKIN)
 
-    def add_plate(self, body_name: str, marker: str, body_from_marker: Array, plate_m: float) -> None:
-        """Add a marker plate (its front face at the marker's origin) and the stalk that holds it."""
+    def add_plate(self, body_name: str, marker: str, body_from_marker: Array, plate_m: float, *, movable: bool) -> None:
+        """Add a marker plate (front face at the marker's origin) and its stalk; movable ones on a body of their own."""
         R, p = body_from_marker[:3, :3], body_from_marker[:3, 3]
         body = self._spec.body(body_name)
+        end = self._place(self._body.gh_from_ac_m) if marker == "m0" else p - 0.035 * R[:, 2]
+        if movable:
+            body = self._add_mount(body, marker, body_from_marker)
+            end = R.T @ (end - p)
+            R, p = np.eye(3), np.zeros(3)
         half = _PLATE_THICKNESS_M / 2
         body.add_geom(
             name=f"{marker}_plate",
@@ -193,10 +211,25 @@ class _PatientBuilder:
             group=PLATE_GROUPS[marker],
         )
         start = p - (half * 2 + 0.006) * R[:, 2]
-        end = self._place(self._body.gh_from_ac_m) if marker == "m0" else p - 0.035 * R[:, 2]
         body.add_geom(
             type=mujoco.mjtGeom.mjGEOM_CAPSULE, fromto=(*start, *end), size=(0.006, 0, 0), rgba=(*_STALK, 1.0), group=1
         )
+
+    @staticmethod
+    def _add_mount(bone: mujoco.MjsBody, marker: str, bone_from_marker: Array) -> mujoco.MjsBody:
+        """Add a body at the marker that slides along and then turns about the marker's nominal axes."""
+        mount = bone.add_body(
+            name=f"{marker}_mount",
+            pos=bone_from_marker[:3, 3],
+            quat=quat_wxyz_from_matrix(bone_from_marker[:3, :3]),
+            mass=1.0,
+            inertia=(1.0, 1.0, 1.0),
+            ipos=(0, 0, 0),
+        )
+        for name, axis in zip("xyz", np.eye(3), strict=True):
+            mount.add_joint(name=f"{marker}_slide_{name}", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=axis)
+        mount.add_joint(name=f"{marker}_turn", type=mujoco.mjtJoint.mjJNT_BALL)
+        return mount
 
     def _place(self, point_m: tuple[float, float, float] | Array) -> Array:
         return np.asarray(point_m, dtype=np.float64) * (1.0, self._sign, 1.0)

@@ -8,14 +8,17 @@ from ghest_rt.config.load import LoadedStation
 from ghest_rt.errors import BadInputError
 from ghest_rt.messages.results import TruthSample
 from ghest_rt.simulation.anatomy import Anatomy
+from ghest_rt.simulation.attachment import Attachment
 from ghest_rt.simulation.camera import FrameTimes, SimulatedCamera
 from ghest_rt.simulation.clinic import Clinic
 from ghest_rt.simulation.coupling import ExoskeletonMotion
+from ghest_rt.simulation.disturbances import MarkerMove
 from ghest_rt.simulation.encoders import LEAD_S, SimulatedEncoders
 from ghest_rt.simulation.imaging import Light
 from ghest_rt.simulation.posture import Motion
 from ghest_rt.simulation.scene import build_scene
 from ghest_rt.simulation.sensors import SensorSet
+from ghest_rt.simulation.soft_tissue import SoftTissue
 from ghest_rt.simulation.texture import MarkerTexture, make_texture
 from ghest_rt.simulation.timeline import Timeline
 
@@ -36,6 +39,8 @@ class World:
         texture: What is printed on the markers.
         light: The light in the room.
         duration_s: How much of the movement; None for all of it.
+        marker_moves: Markers that are not where the calibration says.
+        soft_tissue: How skin moves the markers; None for markers fixed to the bones.
 
     Raises:
         BadInputError: The duration is not positive, or the station's URDF or encoder joints cannot be simulated.
@@ -53,13 +58,16 @@ class World:
         texture: MarkerTexture = "disks",
         light: Light | None = None,
         duration_s: float | None = None,
+        marker_moves: tuple[MarkerMove, ...] = (),
+        soft_tissue: SoftTissue | None = None,
     ) -> None:
         if duration_s is not None and not duration_s > 0:
             raise BadInputError(f"duration {duration_s} s: give a positive number of seconds")
         config = station.config
         settings = config.exoskeleton.settings_m
         duration = motion.duration_s if duration_s is None else min(duration_s, motion.duration_s)
-        scene = build_scene(config, station.urdf_text, station.source, body)
+        disturbed = bool(marker_moves) or soft_tissue is not None
+        scene = build_scene(config, station.urdf_text, station.source, body, movable_plates=disturbed)
         unknown = sorted({*config.encoders.joints, *settings} - set(scene.joint_address))
         if unknown:
             raise BadInputError(
@@ -70,7 +78,8 @@ class World:
         )
         self.station = station
         self.timeline = Timeline(duration)
-        self._clinic = Clinic(scene, config, motion, exoskeleton)
+        attachment = Attachment(scene, marker_moves, soft_tissue) if disturbed else None
+        self._clinic = Clinic(scene, config, motion, exoskeleton, attachment)
         self._cameras = {
             name: SimulatedCamera(
                 self._clinic,
