@@ -1,4 +1,4 @@
-"""Where the files of `config/` are: beside the sources in a checkout, under share/ghest-rt in an installation."""
+"""Where the files of `config/` and `systemd/` are: beside the sources in a checkout, under share/ghest-rt once installed."""
 
 import sys
 from pathlib import Path
@@ -14,8 +14,21 @@ def shipped_config_dir() -> Path:
     Raises:
         GhestError: The installation lacks them.
     """
-    candidates = (_HERE.parents[2] / "config", Path(sys.prefix) / "share" / "ghest-rt" / "config")
+    return _shipped("config", "*.toml")
+
+
+def shipped_systemd_dir() -> Path:
+    """Return the folder with the units and rules that come with ghest-rt.
+
+    Raises:
+        GhestError: The installation lacks them.
+    """
+    return _shipped("systemd", "*.service")
+
+
+def _shipped(name: str, pattern: str) -> Path:
+    candidates = (_HERE.parents[2] / name, Path(sys.prefix) / "share" / "ghest-rt" / name)
     for folder in candidates:
-        if folder.is_dir() and any(folder.glob("*.toml")):
+        if folder.is_dir() and any(folder.glob(pattern)):
             return folder
-    raise GhestError(f"the files of config/ are in none of {', '.join(map(str, candidates))}: install ghest-rt again")
+    raise GhestError(f"the files of {name}/ are in none of {', '.join(map(str, candidates))}: install ghest-rt again")

@@ -1,0 +1,1 @@
+"""`ghest-rt install-service`: plan, steps and record of an installation under systemd."""
