@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from ghest_rt.messages.results import MarkerDrift, Reason, Status
-from tests.estimation_fused.stand import LENGTH_M, Drift, Judged, Trial, rms_deg, run, slide, turn
+from tests.estimation_fused.stand import LENGTH_M, Drift, Judged, Trial, estimator_for, rms_deg, run, slide, turn
 
 BEFORE_S = 2.5
 
@@ -46,7 +46,10 @@ def test_a_slide_during_the_session_is_flagged_and_taken_out(marker: str, axis: 
 @pytest.mark.parametrize("axis", [0, 1, 2])
 @pytest.mark.parametrize("marker", ["m0", "m1"])
 def test_a_turn_during_the_session_is_flagged_and_taken_out(marker: str, axis: int) -> None:
-    judged = run(Trial(duration_s=5.0, drifts=(Drift(marker, turn(axis), BEFORE_S),)))
+    trial = Trial(duration_s=5.0, drifts=(Drift(marker, turn(axis), BEFORE_S),))
+    estimator = estimator_for(trial)
+    judged = run(trial, estimator)
+    assert estimator.counts() == {f"{marker}_outlier": 3, f"{marker}_jump": 1}
     after_s = flagged_after_s(judged, marker, BEFORE_S)
     assert after_s is not None
     assert 0.0 < after_s < 0.3

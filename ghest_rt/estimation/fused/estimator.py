@@ -96,7 +96,7 @@ class FusedEstimator:
 
     def counts(self) -> dict[str, int]:
         """Return how many samples were not used, by reason."""
-        taken = {} if self._timeline is None else dict(self._timeline.counts)
+        taken = {} if self._timeline is None else {reason: n for reason, n in self._timeline.counts.items() if n}
         return {**self._inputs.counts(), **taken}
 
     def estimate(self, t_ns: int) -> GhEstimate:

@@ -14,10 +14,11 @@ _DEPTH = 16
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Entry:
-    """A sighting and what was believed before it."""
+    """A sighting, what was believed before it, and what became of it."""
 
     sighting: Sighting
     before: Belief
+    outcome: Outcome
 
 
 class Timeline:
@@ -46,18 +47,22 @@ class Timeline:
         while entries and entries[-1].sighting.t_ns > sighting.t_ns:
             entry = entries.pop()
             later.append(entry.sighting)
+            self._count(entry.sighting, entry.outcome, -1)
             self._belief = entry.before
         if sighting.t_ns < self._belief.t_ns:
             self.counts[f"{_MARKERS[sighting.marker]}_too_late"] += 1
         else:
-            self._take(sighting, again=False)
+            self._take(sighting)
         for undone in reversed(later):
-            self._take(undone, again=True)
+            self._take(undone)
 
-    def _take(self, sighting: Sighting, *, again: bool) -> None:
+    def _take(self, sighting: Sighting) -> None:
         before = self._belief
-        self._entries.append(_Entry(sighting, before))
         self._belief = before.copy()
         outcome = self._filter.take(self._belief, sighting)
-        if outcome is not Outcome.TAKEN and not again:
-            self.counts[f"{_MARKERS[sighting.marker]}_{outcome}"] += 1
+        self._entries.append(_Entry(sighting, before, outcome))
+        self._count(sighting, outcome, 1)
+
+    def _count(self, sighting: Sighting, outcome: Outcome, by: int) -> None:
+        if outcome is not Outcome.TAKEN:
+            self.counts[f"{_MARKERS[sighting.marker]}_{outcome}"] += by
