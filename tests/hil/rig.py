@@ -98,12 +98,18 @@ class Rig:
         return window
 
     def wait_valid(self, count: int, timeout_s: float) -> bool:
-        """Wait until the newest samples are all valid."""
+        """Wait until the newest samples are all valid; False if they are not in time, or the service has ended."""
         angles = self.subscriber.angles
         start = len(angles)
-        return self.subscriber.wait_until(
-            lambda: len(angles) >= start + count and all(sample.valid for sample in angles[-count:]), timeout_s
-        )
+        deadline_s = time.monotonic() + timeout_s
+
+        def well() -> bool:
+            return len(angles) >= start + count and all(sample.valid for sample in angles[-count:])
+
+        while self.service.poll() is None and time.monotonic() < deadline_s:
+            if self.subscriber.wait_until(well, 0.5):
+                return True
+        return False
 
     def log(self) -> str:
         """Return what the service has written; with fixtures only."""
