@@ -11,6 +11,7 @@ class Method(StrEnum):
 
     PAPER = "paper"
     REFINED = "refined"
+    PHOTOMETRIC = "photometric"
     FUSED = "fused"
     ARUCO = "aruco"
 

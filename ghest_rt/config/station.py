@@ -94,7 +94,7 @@ class Calibration(Strict):
 class Estimator(Strict):
     """How angles are computed."""
 
-    method: Literal["paper", "refined", "fused"] = "refined"
+    method: Literal["paper", "refined", "photometric", "fused"] = "refined"
     encoder_pairing: Literal["interpolate", "nearest"] = "interpolate"
     lag_ms: float = Field(
         default=45.0, ge=0.0, le=500.0, description="A sample is published this long after the instant it holds for"

@@ -10,7 +10,7 @@ from ghest_rt.estimation.interface import GhEstimator
 from ghest_rt.estimation.paper import PaperEstimator
 from ghest_rt.estimation.refined import RefinedEstimator
 
-EstimatorMethod = Literal["paper", "refined", "fused"]
+EstimatorMethod = Literal["paper", "refined", "photometric", "fused"]
 
 
 def make_estimator(
@@ -29,7 +29,7 @@ def make_estimator(
         urdf_text: The URDF it names.
         source: Where the URDF came from, for messages.
         encoder_joints: The joints that the encoder link sends, in its order.
-        method: Overrides `estimator.method`.
+        method: Overrides `estimator.method`; "photometric" estimates as "refined" does, from better markers.
         frame_rate_hz: Nominal frame rate of each camera; the publishing rate where it is not given.
 
     Raises:

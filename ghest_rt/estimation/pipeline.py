@@ -13,7 +13,7 @@ from ghest_rt.messages.results import GhEstimate, MarkerObservation
 from ghest_rt.vision.detector import MarkerDetector
 from ghest_rt.vision.factory import make_detector
 
-Method = Literal["paper", "refined", "aruco", "fused"]
+Method = Literal["paper", "refined", "photometric", "aruco", "fused"]
 
 
 def lag_ns_of(config: StationConfig, method: str | None = None) -> int:
@@ -33,6 +33,7 @@ class Pipeline:
 
     Attributes:
         method: How markers are found and angles estimated ("aruco": OpenCV's markers and the refined estimator;
+            "photometric": photometric detectors and the refined estimator;
             "fused": the refined detectors and the filter).
         rate_hz: How often estimates are wanted.
         lag_ns: How long after an instant its estimate is asked for.

@@ -164,7 +164,7 @@ class DiskMeter:
     def _mixing(
         self, predicted: MarkerImage, light: PlateLight, offsets: Places
     ) -> tuple[list[list[list[float]]], list[tuple[float, float, float]]]:
-        """Return per disk its mixing rows (see `_mixing_rows`), and 1 / s as coefficients of the patch's [1, u, v]."""
+        """Return per disk its mixing rows (see `mixing_rows`), and 1 / s as coefficients of the patch's [1, u, v]."""
         a, b, c, d = predicted.plate_px
         scale = light.level / (a * d - b * c)
         slope_u, slope_v = scale * (d * light.slope[0] - c * light.slope[1]), scale * (a * light.slope[1] - b * light.slope[0])
@@ -173,7 +173,7 @@ class DiskMeter:
             inverse = 1.0 / (light.level * (1.0 + x_m * light.slope[0] + y_m * light.slope[1]))
             gu, gv = -slope_u * inverse * inverse, -slope_v * inverse * inverse
             bright.append((inverse - gu * u - gv * v, gu, gv))
-        return [_mixing_rows(light.rgb, relative) for relative in self.relative], bright
+        return [mixing_rows(light.rgb, relative) for relative in self.relative], bright
 
 
 def _inside(image: NDArray[np.uint8], place: tuple[float, float], disk: DiskImage, reach: float) -> bool:
@@ -191,7 +191,7 @@ def _quadratic(disk: DiskImage, x: float, y: float) -> tuple[float, float, float
     return (x * au + y * av, -2.0 * au, -2.0 * av, a, 2.0 * b, c)
 
 
-def _mixing_rows(plate: tuple[float, float, float], relative: Color) -> list[list[float]]:
+def mixing_rows(plate: tuple[float, float, float], relative: Color) -> list[list[float]]:
     """Return what turns a colour into alpha and two coordinates across the line from plate to disk colour.
 
     Four rows of three numbers: the factors of red, green and blue, and what to take off; all three coordinates have alpha's

@@ -8,9 +8,10 @@ from ghest_rt.errors import BadInputError
 from ghest_rt.vision.aruco import ArucoDetector
 from ghest_rt.vision.detector import MarkerDetector
 from ghest_rt.vision.paper import PaperDetector
+from ghest_rt.vision.photometric.alignment import Alignment
 from ghest_rt.vision.refined import RefinedDetector
 
-Method = Literal["paper", "refined", "aruco"]
+Method = Literal["paper", "refined", "photometric", "aruco"]
 
 
 def make_detector(
@@ -19,22 +20,25 @@ def make_detector(
     """Return a new detector of one marker for one camera.
 
     Args:
-        method: `paper` (eq. (1)-(5)), `refined` (docs/vision.md) or `aruco` (OpenCV's markers, for comparison).
+        method: `paper` (eq. (1)-(5)), `refined` (docs/vision.md), `photometric`
+            (docs/photometric.md) or `aruco` (OpenCV's markers, for comparison).
         camera_name: Name of the camera in the station file, for the observations.
         marker_name: Name of the marker in the station file.
         marker: The marker's geometry and colours.
         info: The camera's calibration.
-        color_only: Leave depth aside (`refined` only; `aruco` never uses it).
+        color_only: Leave depth aside (`refined` and `photometric`; `aruco` never uses it).
 
     Raises:
         BadInputError: No such method, or it cannot do what was asked.
     """
     if method == "refined":
         return RefinedDetector(camera_name, marker_name, marker, info, color_only=color_only)
+    if method == "photometric":
+        return RefinedDetector(camera_name, marker_name, marker, info, color_only=color_only, polish=Alignment)
     if method == "aruco":
         return ArucoDetector(camera_name, marker_name, marker, info)
     if method == "paper":
         if color_only:
             raise BadInputError("method paper cannot work from colour alone: eq. (3) reads every disk's position from depth")
         return PaperDetector(camera_name, marker_name, marker, info)
-    raise BadInputError(f"no vision method {method!r}; choose one of paper, refined, aruco")
+    raise BadInputError(f"no vision method {method!r}; choose one of paper, refined, aruco, photometric")

@@ -15,6 +15,7 @@ class Optics:
     """
 
     def __init__(self, intrinsics: Intrinsics) -> None:
+        self._intrinsics = intrinsics
         self.width_px = intrinsics.width_px
         self.height_px = intrinsics.height_px
         self.focal_px: Array = np.array([intrinsics.fx_px, intrinsics.fy_px])
@@ -56,6 +57,11 @@ class Optics:
             fy * cross,
             fy * (radial + y * y * slope + 6.0 * p1 * y + 2.0 * p2 * x),
         )
+
+    def ray_table(self) -> Array:
+        """Return (3, height * width): the rays (x, y, 1) of all pixels, row by row."""
+        rays = ray_grid(self._intrinsics).reshape(-1, 2).T
+        return np.ascontiguousarray(np.concatenate([rays, np.ones((1, rays.shape[1]))]))
 
     def disk_rays(self, centroids_px: Array, radius2_px: Array) -> Array:
         """Return the rays (n, 2) through the centroids of small disk images (n, 2), as an undistorted image would show them.

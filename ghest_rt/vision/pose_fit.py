@@ -98,7 +98,7 @@ def fit_pose(R: Array, p_m: Array, centers: Centers, plane: Plane | None, max_st
         information = J.T @ J
         gradient = residual @ J
         if plane is not None:
-            off, J_plane = _plane_terms(R, p_m, plane)
+            off, J_plane = plane_terms(R, p_m, plane)
             weighted = plane_information @ J_plane
             information += J_plane.T @ weighted
             gradient += off @ weighted
@@ -123,7 +123,7 @@ def fit_pose(R: Array, p_m: Array, centers: Centers, plane: Plane | None, max_st
     return PoseFit(R, p_m, information, float(residual @ residual), plane_chi2, plane_off, deviations, centers.sigma)
 
 
-def _plane_terms(R: Array, p_m: Array, plane: Plane) -> tuple[Array, Array]:
+def plane_terms(R: Array, p_m: Array, plane: Plane) -> tuple[Array, Array]:
     """Return the residual of theta = n / (n . p) (3,) and the Jacobian (3, 6) of the prediction."""
     n = R[:, 2]
     nx, ny, nz = n.tolist()

@@ -1,5 +1,8 @@
 """Method `refined`: sub-pixel disks and the depth plane fused into one pose with its covariance (docs/vision.md)."""
 
+from collections.abc import Callable
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -19,6 +22,7 @@ from ghest_rt.vision.optics import Optics
 from ghest_rt.vision.planar_pose import Pose, homography, pose_on_plane, poses_of_homography
 from ghest_rt.vision.plate_light import PlateLight, PlateSampler
 from ghest_rt.vision.plate_plane import Plane, PlateDepth
+from ghest_rt.vision.sighting import Polish, Sighting
 from ghest_rt.vision.small import inverse_of
 from ghest_rt.vision.solve import Solution, Solver
 
@@ -45,10 +49,18 @@ class RefinedDetector:
         marker: Geometry and nominal colours.
         info: The camera's calibration.
         color_only: Leave depth aside.
+        polish: What may improve the pose once it is found, from the optics and the layout.
     """
 
     def __init__(
-        self, camera_name: str, marker_name: str, marker: Marker, info: CameraInfo, *, color_only: bool = False
+        self,
+        camera_name: str,
+        marker_name: str,
+        marker: Marker,
+        info: CameraInfo,
+        *,
+        color_only: bool = False,
+        polish: Callable[[MarkerLayout, Optics], Polish] | None = None,
     ) -> None:
         self._camera = camera_name
         self._marker = marker_name
@@ -68,6 +80,7 @@ class RefinedDetector:
         self._depth_from_color = inverse(info.color_from_depth)
         self._same_place = bool(np.abs(info.color_from_depth - np.eye(4)).max() < 1e-12)
         margin_m = self._layout.half_plate_m - float(np.abs(self._layout.centers_m).max()) - self._layout.radius_m
+        self._polish = None if polish is None else polish(self._layout, self._optics)
         self._margin = max(margin_m, 0.1 * self._layout.radius_m) / self._layout.radius_m
 
     def reset(self) -> None:
@@ -75,6 +88,8 @@ class RefinedDetector:
         self._motion.reset()
         self._meter.reset()
         self._white = None
+        if self._polish is not None:
+            self._polish.reset()
 
     def detect(self, frame: RgbdFrame) -> MarkerObservation:
         """Return the marker's pose in the colour camera frame with its covariance, or why there is none.
@@ -123,7 +138,7 @@ class RefinedDetector:
         solution = self._solver.track(centers, plane, (predicted[:3, :3], predicted[:3, 3]))
         if solution.fit is not None:
             self._learn(measured)
-        return solution
+        return self._polished(frame, measured, plane, solution)
 
     def _search(self, frame: RgbdFrame) -> Solution:
         """Look for the marker everywhere, first under the light last seen or guessed, then under neutral light."""
@@ -156,13 +171,24 @@ class RefinedDetector:
         starts = poses_of_homography(homography(centers.plate_m, centers.rays))
         if starts is None:
             return Solution(MarkerStatus.BAD_FIT, disks=len(centers.sigma))
-        solution = self._solver.cold(centers, self._cold_plane(frame, starts), starts)
+        plane = self._cold_plane(frame, starts)
+        solution = self._solver.cold(centers, plane, starts)
         if solution.fit is not None and len(constellation.seen) == 3:
             # The homography was only affine: look again from the pose, also for the disk that was missing.
             solution = self._track(frame, transform(solution.fit.R, solution.fit.p_m))
         elif solution.fit is not None:
             self._learn(measured)
+            solution = self._polished(frame, measured, plane, solution)
         return solution
+
+    def _polished(self, frame: RgbdFrame, measured: DiskCenters, plane: Plane | None, solution: Solution) -> Solution:
+        """Return the solution with a better pose where there is one; a disk left out by the fit must not come in again."""
+        seen = sum(disk is not None for disk in measured)
+        if self._polish is None or solution.fit is None or self._light is None or solution.disks < seen:
+            return solution
+        used = plane if solution.status is MarkerStatus.OK else None
+        fit = self._polish(Sighting(frame.color_rgb, measured, self._light, used, solution.fit))
+        return solution if fit is None else replace(solution, fit=fit)
 
     def _cold_pair(self, frame: RgbdFrame, constellation: Constellation) -> Solution:
         """Solve from two disks on the plane that depth shows around them."""

@@ -1,0 +1,43 @@
+"""What `refined` knows of one frame when it has its pose, for whoever can do better with it."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ghest_rt.vision.disk_centers import DiskCenters
+from ghest_rt.vision.plate_light import PlateLight
+from ghest_rt.vision.plate_plane import Plane
+from ghest_rt.vision.pose_fit import PoseFit
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sighting:
+    """One marker in one frame.
+
+    Attributes:
+        image: (H, W, 3) colour image.
+        measured: The disks p0..p3; None where one is not wholly seen.
+        light: The light on the plate.
+        plane: The plate's plane in the colour camera at the colour image's time; None where depth takes no part.
+        fit: The pose found.
+    """
+
+    image: NDArray[np.uint8]
+    measured: DiskCenters
+    light: PlateLight
+    plane: Plane | None
+    fit: PoseFit
+
+
+class Polish(Protocol):
+    """Improves a pose."""
+
+    def __call__(self, sighting: Sighting) -> PoseFit | None:
+        """Return a better fit, or None to keep the one that there is."""
+        ...
+
+    def reset(self) -> None:
+        """Forget what earlier frames taught."""
+        ...
