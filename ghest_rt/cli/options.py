@@ -58,7 +58,7 @@ Shifts = Annotated[
     list[str] | None,
     typer.Option(
         metavar="MARKER:AXIS:METRES[@START_S]",
-        help="Displace a marker: m0 along the GH frame's axes, m1 along the elbow frame's (m1:x:0.02); again for more",
+        help="Displace a marker: m0 along the GH frame's axes, m1 along the elbow frame's (m1:z:0.02); again for more",
         show_default=False,
     ),
 ]
