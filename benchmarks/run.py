@@ -9,12 +9,13 @@ from typing import Any
 
 from rich.console import Console
 
-from benchmarks import encoder_path, footprint, loop, pose, recording, throughput, tick
+from benchmarks import bound, encoder_path, footprint, loop, pose, recording, throughput, tick
 from benchmarks.plot import draw
 
 _OUT = Path(__file__).resolve().parents[1] / "out" / "benchmarks"
 _BENCHMARKS: dict[str, Callable[[bool], dict[str, Any]]] = {
     "pose": pose.run,
+    "bound": bound.run,
     "tick": tick.run,
     "throughput": throughput.run,
     "loop": loop.run,
