@@ -5,6 +5,7 @@ A further backend is one more line in a table: the module and the callable that 
 """
 
 import importlib
+import importlib.util
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -22,25 +23,27 @@ class Backend:
         module: Its module's dotted path.
         maker: The callable in it.
         extra: The extra of ghest-rt that installs what it needs; "" if nothing.
+        libraries: The top-level modules that the extra brings and without which the device can never open.
     """
 
     module: str
     maker: str
     extra: str = ""
+    libraries: tuple[str, ...] = ()
 
 
 CAMERAS: dict[str, Backend] = {
     "sim": Backend("ghest_drivers.sim", "SimCamera", "sim"),
-    "realsense": Backend("ghest_drivers.hardware.camera_backends", "realsense", "realsense"),
-    "realsense_bag": Backend("ghest_drivers.hardware.camera_backends", "realsense_bag", "realsense"),
-    "oak": Backend("ghest_drivers.hardware.camera_backends", "oak", "oak"),
+    "realsense": Backend("ghest_drivers.hardware.camera_backends", "realsense", "realsense", ("pyrealsense2",)),
+    "realsense_bag": Backend("ghest_drivers.hardware.camera_backends", "realsense_bag", "realsense", ("pyrealsense2",)),
+    "oak": Backend("ghest_drivers.hardware.camera_backends", "oak", "oak", ("depthai",)),
 }
 ENCODERS: dict[str, Backend] = {
     "sim": Backend("ghest_drivers.sim", "SimEncoders", "sim"),
-    "serial": Backend("ghest_drivers.hardware.encoders.serial_link", "SerialEncoderLink", "serial"),
-    "can": Backend("ghest_drivers.hardware.encoders.can_link", "CanEncoderLink", "can"),
-    "can_log": Backend("ghest_drivers.hardware.encoders.can_log", "can_log_link", "can"),
-    "canopen": Backend("ghest_drivers.hardware.encoders.canopen_link", "CanopenEncoderLink", "can"),
+    "serial": Backend("ghest_drivers.hardware.encoders.serial_link", "SerialEncoderLink", "serial", ("serial",)),
+    "can": Backend("ghest_drivers.hardware.encoders.can_link", "CanEncoderLink", "can", ("can", "cantools")),
+    "can_log": Backend("ghest_drivers.hardware.encoders.can_log", "can_log_link", "can", ("can", "cantools")),
+    "canopen": Backend("ghest_drivers.hardware.encoders.canopen_link", "CanopenEncoderLink", "can", ("can", "canopen")),
     "armeo": Backend("ghest_drivers.hardware.encoders.armeo_export", "armeo_link"),
 }
 
@@ -82,6 +85,10 @@ def _make(what: str, table: Mapping[str, Backend], name: str, arguments: Mapping
     backend = table.get(name)
     if backend is None:
         raise DeviceNotFound(f"no {what} backend {name!r}; there are {', '.join(sorted(table))}")
+    # Found out here, not when the device opens: a device may come back, a library will not, so nobody should wait for it.
+    missing = [library for library in backend.libraries if importlib.util.find_spec(library) is None]
+    if missing:
+        raise DeviceNotFound(f"{what} backend {name} needs {', '.join(missing)}: pip install 'ghest-rt[{backend.extra}]'")
     try:
         module = importlib.import_module(backend.module)
     except ImportError as error:

@@ -171,7 +171,7 @@ class _Replayer:
                 summary = run_service(service, self._stop)
             finally:
                 player.close()
-        return report_of(recording.path.name, facts.method, summary, scoreboard, recording.problems)
+        return report_of(recording.path.name, facts.method, summary, scoreboard, problems=recording.problems)
 
     def _unpaced(
         self, recording: Recording, station: LoadedStation, facts: LiveFacts, outputs: tuple[Output, ...]
@@ -192,7 +192,9 @@ class _Replayer:
                 (*outputs, scoreboard, view, self._manager),
                 self._stop,
             )
-        return report_of(recording.path.name, facts.method, counts, scoreboard, recording.problems)
+        return report_of(
+            recording.path.name, facts.method, counts, scoreboard, problems=recording.problems, unused=pipeline.counts()
+        )
 
     def _pipeline(self, station: LoadedStation, infos: dict[str, CameraInfo], joints: tuple[str, ...]) -> Pipeline:
         method = self._options.method

@@ -1,13 +1,13 @@
 """What a run came to, at its end."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 
 from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from ghest_rt.cli.console import print_json
+from ghest_rt.cli.console import print_json, unused_in_words
 from ghest_rt.cli.recording import print_recorded, recorded_document
 from ghest_rt.cli.scoreboard import Scoreboard
 from ghest_rt.messages.published import Lateness
@@ -27,6 +27,7 @@ class RunReport:
         samples: Published.
         starting: Of these while not every input had arrived.
         valid_fraction: Share of valid ones, after the start.
+        degraded_fraction: Share of degraded ones (angles from less than normal), after the start.
         rate_hz: Samples per second of their own time, after the start.
         missed_ticks: Grid slots skipped; None without a clock.
         lateness: Of the ticks; None without a clock.
@@ -35,6 +36,7 @@ class RunReport:
         orientation_rmse_deg: Against the truth; None without.
         position_rmse_mm: Against the truth; None without.
         problems: What was left out of the recording.
+        unused: Samples that the estimator did not use, by reason.
     """
 
     source: str
@@ -43,6 +45,7 @@ class RunReport:
     samples: int
     starting: int
     valid_fraction: float
+    degraded_fraction: float
     rate_hz: float
     missed_ticks: int | None
     lateness: Lateness | None
@@ -51,6 +54,7 @@ class RunReport:
     orientation_rmse_deg: float | None
     position_rmse_mm: float | None
     problems: tuple[str, ...]
+    unused: Mapping[str, int]
 
 
 def report_of(
@@ -58,9 +62,11 @@ def report_of(
     method: str,
     result: ServiceSummary | SampleCounts,
     scoreboard: Scoreboard | None,
+    *,
     problems: Sequence[object] = (),
+    unused: Mapping[str, int] | None = None,
 ) -> RunReport:
-    """Return the report of a paced run (a summary) or an unpaced one (counts)."""
+    """Return the report of a paced run (a summary, which counts the unused samples) or an unpaced one (counts)."""
     paced = result if isinstance(result, ServiceSummary) else None
     judged = scoreboard.judged if scoreboard is not None else 0
     after_start = result.published - result.starting
@@ -71,6 +77,7 @@ def report_of(
         samples=result.published,
         starting=result.starting,
         valid_fraction=result.valid / after_start if after_start else 0.0,
+        degraded_fraction=result.degraded / after_start if after_start else 0.0,
         rate_hz=(after_start - 1) / result.duration_s if result.duration_s > 0 else 0.0,
         missed_ticks=paced.missed_ticks if paced else None,
         lateness=paced.lateness if paced else None,
@@ -79,6 +86,7 @@ def report_of(
         orientation_rmse_deg=scoreboard.orientation_rmse_deg if scoreboard is not None and judged else None,
         position_rmse_mm=scoreboard.position_rmse_mm if scoreboard is not None and judged else None,
         problems=tuple(str(problem) for problem in problems),
+        unused=dict(paced.unused if paced else unused or {}),
     )
 
 
@@ -120,6 +128,10 @@ def print_reports(
     for report in reports:
         if report.skipped_frames:
             console.print(f"{report.source}: {report.skipped_frames} frames skipped, vision was slower than the cameras")
+        if report.degraded_fraction:
+            console.print(f"{report.source}: {100.0 * report.degraded_fraction:.2f} % degraded, with angles")
+        if report.unused:
+            console.print(f"{report.source}: {unused_in_words(report.unused)}")
     if recorded is not None:
         print_recorded(console, recorded)
 

@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.progress import Progress, TaskID
 from rich.table import Table
 
-from ghest_rt.cli.console import print_json
+from ghest_rt.cli.console import print_json, unused_in_words
 from ghest_rt.cli.options import Method
 from ghest_rt.errors import BadInputError
 from ghest_rt.studies.score import RecordingScore, score_recording
@@ -101,3 +101,5 @@ def _print_table(scores: Sequence[RecordingScore]) -> None:
     for score in scores:
         for line in score.skipped:
             console.print(f"{Path(score.recording).name}: {line}", style="yellow", markup=False)
+        if score.unused:
+            console.print(f"{Path(score.recording).name}: {unused_in_words(score.unused)}", markup=False)

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import ValidationError
 
 from ghest_drivers.samples import CameraInfo, EncoderSample, RgbdFrame
 from ghest_rt.messages.results import TruthSample
@@ -23,6 +24,14 @@ class _Awaited:
 
     depth: tuple[RawMessage, NDArray[np.uint16]] | None = None
     device_time: tuple[int, int] | None = None  # (seq, t_device_ns)
+
+
+def _told(error: ValueError) -> str:
+    """The text of an error; of a JSON row's only which keys are wrong and how."""
+    if not isinstance(error, ValidationError):
+        return str(error)
+    found = error.errors(include_url=False, include_input=False)
+    return "; ".join(f"{'.'.join(map(str, item['loc']))}: {item['msg']}".removeprefix(": ") for item in found)
 
 
 class EventDecoder:
@@ -56,7 +65,7 @@ class EventDecoder:
         except UnusableImageError as error:
             self._skip(error.skip, stream.topic, message, str(error))
         except ValueError as error:
-            self._skip(Skip.DAMAGED_MESSAGE, stream.topic, message, " ".join(str(error).split()))
+            self._skip(Skip.DAMAGED_MESSAGE, stream.topic, message, " ".join(_told(error).split()))
         return None
 
     def finish(self) -> None:

@@ -25,6 +25,10 @@ class PipelineLike(Protocol):
         """Return the joint at `t_ns`; called on the loop's thread."""
         ...
 
+    def counts(self) -> dict[str, int]:
+        """Return how many samples were not used since the start, by reason; called on the loop's thread."""
+        ...
+
 
 MakePipeline = Callable[[dict[str, CameraInfo], tuple[str, ...]], PipelineLike]
 
@@ -57,6 +61,7 @@ class ServiceSummary:
         missed_ticks: Grid slots skipped.
         lateness: How late the ticks came.
         inputs: Counters of every input.
+        unused: Samples that arrived whole but were not used (repeated, out of order, implausible…), by reason.
     """
 
     duration_s: float
@@ -67,3 +72,4 @@ class ServiceSummary:
     missed_ticks: int
     lateness: Lateness
     inputs: Mapping[str, InputCounters]
+    unused: Mapping[str, int]

@@ -3,6 +3,7 @@
 import asyncio
 import gc
 import logging
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
@@ -67,6 +68,7 @@ class Service:
         self._infos: dict[str, CameraInfo] = {}
         self._joints: tuple[str, ...] | None = None
         self._pipeline: PipelineLike | None = None
+        self._unused: Counter[str] = Counter()
         self._first_capture_ns: dict[str, int] = {}
         self._last_capture_ns: dict[str, int] = {}
         self._anchor_ns: int | None = None
@@ -127,6 +129,7 @@ class Service:
             missed_ticks=self._pacer.missed,
             lateness=lateness(self._pacer),
             inputs=self._counters,
+            unused=self._unused + Counter(self._pipeline.counts() if self._pipeline is not None else {}),
         )
 
     # What the workers tell (InputListener).
@@ -142,7 +145,7 @@ class Service:
         self._infos[name] = info
         if known is not None and not same_camera(known, info):
             self._event(EventKind.INPUT_CHANGED, "warning", name, "the camera came back with another calibration")
-            self._pipeline = None
+            self._drop_pipeline()
         self._prepare()
 
     def encoders_connected(self, info: EncoderInfo) -> None:
@@ -150,7 +153,7 @@ class Service:
         self._event(EventKind.INPUT_CONNECTED, "info", ENCODERS, ", ".join(info.joint_names))
         if self._joints is not None and self._joints != info.joint_names:
             self._event(EventKind.INPUT_CHANGED, "warning", ENCODERS, "the link came back with other joints")
-            self._pipeline = None
+            self._drop_pipeline()
         self._joints = info.joint_names
         self._prepare()
 
@@ -189,6 +192,11 @@ class Service:
                 self._pipeline.add(item)
             except Exception as error:
                 self._fail(error)
+
+    def _drop_pipeline(self) -> None:
+        if self._pipeline is not None:
+            self._unused.update(self._pipeline.counts())
+        self._pipeline = None
 
     def _prepare(self) -> None:
         if self._pipeline is None:

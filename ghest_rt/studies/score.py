@@ -31,6 +31,7 @@ class RecordingScore:
         samples: Instants of the grid.
         valid_fraction: Share of them with status `valid`.
         skipped: What of the recording could not be used.
+        unused: Samples that the estimator did not use, by reason.
     """
 
     recording: str
@@ -42,6 +43,7 @@ class RecordingScore:
     samples: int
     valid_fraction: float
     skipped: tuple[str, ...]
+    unused: dict[str, int]
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +54,7 @@ class JudgedRun:
     method: str
     estimates: list[GhEstimate]
     truth: TruthTrack
+    unused: dict[str, int]
 
 
 def run_with_truth(
@@ -84,7 +87,7 @@ def run_with_truth(
         estimates.append(estimate)
         if progress is not None and len(estimates) % 20 == 0:
             progress(min(1.0, (estimate.t_sample_ns - estimates[0].t_sample_ns) / max(recording.duration_ns, 1)))
-    return JudgedRun(recording, pipeline.method, estimates, truth)
+    return JudgedRun(recording, pipeline.method, estimates, truth, pipeline.counts())
 
 
 def score_recording(
@@ -106,6 +109,7 @@ def score_recording(
         samples=errors.samples,
         valid_fraction=errors.valid_fraction,
         skipped=tuple(str(problem) for problem in run.recording.problems),
+        unused=run.unused,
     )
 
 

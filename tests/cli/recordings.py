@@ -13,8 +13,11 @@ PERIOD_NS = 15_015_015
 LATENCY_NS = 2_000_000
 
 
-def write_blank_recording(path: Path, frames: int = 20) -> Path:
-    """Write `frames` black 128x128 frames of both cameras at 66.6 Hz and encoder samples that bracket them."""
+def write_blank_recording(path: Path, frames: int = 20, encoder_copies: int = 1) -> Path:
+    """Write `frames` black 128x128 frames of both cameras at 66.6 Hz and encoder samples that bracket them.
+
+    Every encoder sample stands there `encoder_copies` times.
+    """
     station = load_station(shipped_config_dir() / "station-sim.toml")
     joints = station.config.encoders.joints
     pinhole = Intrinsics(128, 128, 154.5, 154.5, 63.5, 63.5)
@@ -26,7 +29,8 @@ def write_blank_recording(path: Path, frames: int = 20) -> Path:
         for k in range(frames + 1):
             t_ns = k * PERIOD_NS
             sample = EncoderSample(k, np.zeros(len(joints)), t_ns, t_ns + LATENCY_NS, t_ns)
-            writer.write_encoder(sample, joints)
+            for _ in range(encoder_copies):
+                writer.write_encoder(sample, joints)
             for info in infos if k < frames else []:
                 writer.write_frame(RgbdFrame(info, k, black, nothing, t_ns, t_ns + LATENCY_NS, t_ns, t_ns))
     return path

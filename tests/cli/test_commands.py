@@ -9,6 +9,7 @@ import pytest
 
 from ghest_rt.cli.table_file import COLUMNS
 from tests.cli.conftest import Run
+from tests.cli.recordings import write_blank_recording
 
 
 def test_help_names_every_command_and_the_way_in(ghest_rt: Run) -> None:
@@ -68,6 +69,18 @@ def test_estimate_writes_the_same_bytes_twice(ghest_rt: Run, blank: Path, tmp_pa
     assert rows[0]["status"] == "lost"
     assert rows[0]["flexion_deg"] == ""
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.csv", "a.parquet", "b.csv", "b.parquet"]
+
+
+def test_what_the_estimator_does_not_use_is_counted_and_told(ghest_rt: Run, tmp_path: Path) -> None:
+    messy = write_blank_recording(tmp_path / "messy.mcap", encoder_copies=3)
+    done = ghest_rt("estimate", messy, "--out", tmp_path / "a.csv")
+    assert done.returncode == 0, done.stderr
+    assert "encoders_duplicate x42" in done.stdout
+    done = ghest_rt("estimate", messy, "--out", tmp_path / "a.csv", "--json")
+    assert json.loads(done.stdout)["unused"] == {"encoders_duplicate": 42}
+    for speed in ("max", "1"):  # paced, the run ends with the cameras: what comes at the very end is not taken in
+        done = ghest_rt("--replay", messy, "--speed", speed, "--json", "--no-publish")
+        assert 20 <= json.loads(done.stdout)["runs"][0]["unused"]["encoders_duplicate"] <= 42
 
 
 def test_schema_prints_all_messages(ghest_rt: Run, tmp_path: Path) -> None:

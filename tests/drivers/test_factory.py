@@ -22,6 +22,12 @@ def test_a_missing_library_is_told_with_the_extra_that_brings_it(monkeypatch: py
         make_encoders("rare", VirtualClock(), {})
 
 
+def test_a_library_that_the_backend_would_import_later_is_asked_for_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(factory.CAMERAS, "rare", Backend("builtins", "dict", "rare", ("sys", "a_library_nobody_has")))
+    with pytest.raises(DeviceNotFound, match=r"rare needs a_library_nobody_has: pip install 'ghest-rt\[rare\]'"):
+        make_camera("rare", "r0", VirtualClock(), {})
+
+
 def test_settings_reach_the_backend(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(factory.CAMERAS, "recorder", Backend("builtins", "dict"))
     clock = VirtualClock()

@@ -117,7 +117,7 @@ def _row(**changes: Any) -> bytes:
         ("/r0/depth/image", DEPTH.encoded(), Skip.UNPAIRED_DEPTH, "no colour image with number 7 follows"),
         ("/r0/color/calibration", Calibration(D=(0.5,)).encoded(), Skip.CHANGED_CAMERA, "differs from the first"),
         ("/r1/info", b"{}", Skip.CHANGED_CAMERA, "differs from the first"),
-        ("/r1/device_time", b"[]", Skip.DAMAGED_MESSAGE, "DeviceTimeRow"),
+        ("/r1/device_time", b"[]", Skip.DAMAGED_MESSAGE, "should be an object"),
         ("/truth/state", b"{}", Skip.DAMAGED_MESSAGE, "gh_from_arm"),
     ],
 )

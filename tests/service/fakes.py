@@ -131,6 +131,9 @@ class FakePipeline:
             self.observed.append((item.camera, item.seq))
             self.newest_ns[item.camera] = item.t_capture_ns
 
+    def counts(self) -> dict[str, int]:
+        return {"encoders_repeated": 2}
+
     def estimate(self, t_ns: int) -> GhEstimate:
         self.asked_ns.append(t_ns)
         newest = dict(self.newest_ns)

@@ -88,6 +88,7 @@ async def test_samples_are_numbered_on_the_grid_and_carry_their_age() -> None:
     samples = rig.out.samples
     assert [s.seq for s in samples] == list(range(len(samples)))
     assert summary.published == len(samples)
+    assert summary.unused == {"encoders_repeated": 2}
     assert all(s.t_publish_ns - s.t_sample_ns >= LAG_NS for s in samples)
     assert all(b.t_sample_ns > a.t_sample_ns for a, b in itertools.pairwise(samples))
     lost = [s for s in samples if s.status is Status.LOST]
