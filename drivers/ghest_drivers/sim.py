@@ -151,6 +151,7 @@ class SimEncoders:
     async def close(self) -> None:
         """Stop the encoders."""
         self._is_open = False
+        self._sleeper.close()
 
     def _simulate(self, info: EncoderInfo) -> EncoderSample:
         sample = self._world.encoder_sample(self._next)
@@ -162,4 +163,3 @@ class SimEncoders:
             t_arrival_ns=sample.t_arrival_ns + self._start_ns,
             t_capture_ns=sample.t_capture_ns + self._start_ns,
         )
-        self._sleeper.close()

@@ -75,10 +75,6 @@ class LiveView:
         if self._live is not None:
             self._live.stop()
 
-    def retitle(self, facts: LiveFacts) -> None:
-        """Head the page anew: another recording."""
-        self._facts = facts
-
     def angles(self, message: GhAngles, estimate: GhEstimate) -> None:
         """Keep the newest sample for the next drawing."""
         self._message = message

@@ -100,7 +100,7 @@ def run(
     listen: _Listen = None,
     no_publish: _NoPublish = False,
     duration_s: Annotated[
-        float | None, typer.Option("--duration", metavar="SECONDS", help="Stop after this long", show_default=False)
+        float | None, typer.Option("--duration", min=0.1, metavar="SECONDS", help="Stop after this long", show_default=False)
     ] = None,
     movement: Annotated[
         Movement,
@@ -130,7 +130,7 @@ def record(
     listen: _Listen = None,
     no_publish: _NoPublish = False,
     duration_s: Annotated[
-        float | None, typer.Option("--duration", metavar="SECONDS", help="Stop after this long", show_default=False)
+        float | None, typer.Option("--duration", min=0.1, metavar="SECONDS", help="Stop after this long", show_default=False)
     ] = None,
     movement: Annotated[
         Movement,

@@ -103,8 +103,3 @@ class PoseTrack:
             newest_ns=second.newest_ns,
             encoders_ns=second.encoders_ns,
         )
-
-    def latest(self, t_ns: int) -> PoseSample | None:
-        """Return the newest sample not later than `t_ns`, or None."""
-        found = self._history.before(t_ns)
-        return None if found is None else found[1]

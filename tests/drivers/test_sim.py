@@ -1,5 +1,6 @@
 """The simulated devices' own behaviour, beyond what every backend promises."""
 
+import threading
 from collections.abc import Callable
 
 import numpy as np
@@ -70,3 +71,16 @@ async def test_every_encoder_sample_is_delivered_however_late() -> None:
         while True:
             read.append((await encoders.read(1.0)).seq)
     assert read == list(range(20))
+
+
+async def test_closed_encoders_leave_no_thread_behind() -> None:
+    before = set(threading.enumerate())
+    encoders = SimEncoders(_World(), VirtualClock(), 0)
+    await encoders.open()
+    await encoders.read(1.0)
+    started = [thread for thread in threading.enumerate() if thread not in before]
+    await encoders.close()
+    assert started
+    for thread in started:
+        thread.join(5.0)
+    assert not any(thread.is_alive() for thread in started)

@@ -82,8 +82,7 @@ def test_frames_out_of_order_are_put_right_and_a_second_of_one_instant_is_refuse
     t = track(sample(0, 0.0), sample(30, 0.6), sample(15, 0.1))
     assert angle_between_rad(at(t, 20).e_from_marker[:3, :3], rot_z(0.1 + 0.5 / 3)) < 1e-12
     assert not t.add(sample(15, 0.9))
-    assert t.latest(29 * MS) is t.at(15 * MS, GAP)
-    assert t.latest(-1) is None
+    assert angle_between_rad(at(t, 15).e_from_marker[:3, :3], rot_z(0.1)) < 1e-12
 
 
 def test_memory_is_bounded_over_a_long_session() -> None:
