@@ -23,7 +23,7 @@ import numpy as np
 
 from benchmarks.timing import summary_ms
 from ghest_drivers.clock import MonotonicClock
-from ghest_drivers.errors import ReadTimeout
+from ghest_drivers.errors import DriverError, ReadTimeout
 from ghest_drivers.hardware.encoders.binary_frame import DOCUMENTED_RAD_PER_COUNT, BinaryFrameDecoder, documented_format
 from ghest_drivers.hardware.encoders.builder import SampleBuilder
 from ghest_drivers.hardware.encoders.can_bus import CanBusSettings
@@ -171,7 +171,7 @@ async def _receive(link: SampleQueueLink, seconds: float, time_wrap_ns: int) -> 
             sample = await link.read(timeout_s)
         except ReadTimeout:
             break
-        except Exception:
+        except DriverError:
             if received:
                 break
             await link.close()  # silent while the sender starts

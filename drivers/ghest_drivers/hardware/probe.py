@@ -34,7 +34,7 @@ def probe(family: Family, timeout_s: float = 10.0) -> ProbeResult:
     """Return what the library of a family of cameras sees now."""
     command = [sys.executable, "-m", __name__, family]
     try:
-        done = subprocess.run(command, capture_output=True, text=True, timeout=timeout_s, check=False)  # noqa: S603
+        done = subprocess.run(command, capture_output=True, text=True, timeout=timeout_s, check=False)  # noqa: S603 - our own interpreter and module
     except subprocess.TimeoutExpired:
         return ProbeResult((), f"its library did not answer within {timeout_s:g} s: unplug the cameras and plug them in again")
     lines = done.stdout.strip().splitlines()

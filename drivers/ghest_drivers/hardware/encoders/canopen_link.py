@@ -110,7 +110,7 @@ class CanopenEncoderLink(SampleQueueLink):
         """Set up every node and start it; blocks on SDO transfers while the receiver runs."""
         try:
             import canopen  # noqa: PLC0415 - only where this backend is chosen
-            from canopen.sdo.exceptions import SdoError  # noqa: PLC0415
+            from canopen.sdo.exceptions import SdoError  # noqa: PLC0415 - likewise
         except ImportError as error:
             raise DeviceNotFound("CANopen encoders need canopen: pip install 'ghest-rt[can]'") from error
         self._network = canopen.Network(bus)

@@ -1,6 +1,7 @@
 """What all encoder links share: a bounded queue between whoever receives and the one coroutine that reads."""
 
 import asyncio
+from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Sequence
 
@@ -16,7 +17,7 @@ _QUEUE = 4096
 _NS_PER_S = 1_000_000_000
 
 
-class SampleQueueLink:
+class SampleQueueLink(ABC):
     """Base of the hardware encoder links: implements `EncoderLink` but for connecting and disconnecting.
 
     A link that brings no acceptable sample for `silent_s` counts as lost, whatever else arrives, so that its owner re-opens it.
@@ -112,13 +113,13 @@ class SampleQueueLink:
         self._wake()
         await self._disconnect()
 
+    @abstractmethod
     async def _connect(self) -> None:
         """Start receiving."""
-        raise NotImplementedError
 
+    @abstractmethod
     async def _disconnect(self) -> None:
         """Stop receiving and release everything."""
-        raise NotImplementedError
 
     def _deliver(self, readings: Sequence[RawReading], t_arrival_ns: int, t_first_ns: int | None = None) -> None:
         """Queue what was received at one instant (its first part at `t_first_ns`); on the event loop's thread."""

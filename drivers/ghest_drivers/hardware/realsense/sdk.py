@@ -12,7 +12,7 @@ def load_sdk() -> Any:
         DeviceNotFound: It is not installed, or lacks a system library.
     """
     try:
-        import pyrealsense2  # noqa: PLC0415
+        import pyrealsense2  # noqa: PLC0415 - only where this backend is chosen
     except ModuleNotFoundError as error:
         raise DeviceNotFound("the library for RealSense cameras is missing: pip install 'ghest-rt[realsense]'") from error
     except ImportError as error:
