@@ -1,12 +1,12 @@
 """An encoder link that reads a file: Armeocontrol exports and CAN logs."""
 
-import asyncio
 from collections.abc import Callable, Iterator
 
 from ghest_drivers.clock import Clock
 from ghest_drivers.errors import BadDeviceData, DeviceLost, DeviceNotFound, EndOfStream, ReadTimeout
 from ghest_drivers.hardware.encoders.channels import Channel
 from ghest_drivers.hardware.encoders.stats import LinkStats
+from ghest_drivers.hardware.encoders.wakeup import Wakeup
 from ghest_drivers.samples import EncoderInfo, EncoderSample
 
 _NS_PER_S = 1_000_000_000
@@ -43,7 +43,7 @@ class FileEncoderLink:
         self._next: EncoderSample | None = None
         self._end = "the end of the file"
         self._shift_ns = 0
-        self._waiter: asyncio.Future[None] | None = None
+        self._wakeup = Wakeup()
 
     @property
     def info(self) -> EncoderInfo:
@@ -94,17 +94,13 @@ class FileEncoderLink:
                 return self._take(self._source, self._next)
             if now_ns >= deadline_ns:
                 raise ReadTimeout(f"{self._name}: no encoder sample within {timeout_s * 1000:.0f} ms")
-            await self._wait((min(due_ns, deadline_ns) - now_ns) / _NS_PER_S)
+            await self._wakeup.wait((min(due_ns, deadline_ns) - now_ns) / _NS_PER_S)
 
     async def close(self) -> None:
         """Close the file; harmless if not open; wakes a waiting `read`, which then raises DeviceLost."""
         self._source = None
         self._next = None
-        self._wake()
-
-    def _wake(self) -> None:
-        if self._waiter is not None and not self._waiter.done():
-            self._waiter.set_result(None)
+        self._wakeup.wake()
 
     def _take(self, source: Iterator[EncoderSample], sample: EncoderSample) -> EncoderSample:
         try:
@@ -119,13 +115,3 @@ class FileEncoderLink:
             sample.t_arrival_ns + self._shift_ns,
             sample.t_capture_ns + self._shift_ns,
         )
-
-    async def _wait(self, timeout_s: float) -> None:
-        loop = asyncio.get_running_loop()
-        self._waiter = loop.create_future()
-        timer = loop.call_later(timeout_s, self._wake)
-        try:
-            await self._waiter
-        finally:
-            timer.cancel()
-            self._waiter = None

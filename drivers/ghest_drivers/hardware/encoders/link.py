@@ -1,6 +1,5 @@
 """What all encoder links share: a bounded queue between whoever receives and the one coroutine that reads."""
 
-import asyncio
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Sequence
@@ -11,6 +10,7 @@ from ghest_drivers.hardware.encoders.builder import Counting, SampleBuilder
 from ghest_drivers.hardware.encoders.channels import Channel
 from ghest_drivers.hardware.encoders.reading import RawReading
 from ghest_drivers.hardware.encoders.stats import LinkStats, Rejection
+from ghest_drivers.hardware.encoders.wakeup import Wakeup
 from ghest_drivers.samples import EncoderInfo, EncoderSample
 
 _QUEUE = 4096
@@ -43,7 +43,7 @@ class SampleQueueLink(ABC):
         self._builder = SampleBuilder(channels, counting, self.stats)
         self._queue: deque[EncoderSample] = deque()
         self._failure: DriverError | None = None
-        self._waiter: asyncio.Future[None] | None = None
+        self._wakeup = Wakeup()
         self._open = False
         self._alive_ns = 0
 
@@ -101,7 +101,7 @@ class SampleQueueLink(ABC):
                 )
             if now_ns >= deadline_ns:
                 raise ReadTimeout(f"{self._name}: no encoder sample within {timeout_s * 1000:.0f} ms")
-            await self._wait((min(deadline_ns, silent_until_ns) - now_ns) / _NS_PER_S)
+            await self._wakeup.wait((min(deadline_ns, silent_until_ns) - now_ns) / _NS_PER_S)
         return self._queue.popleft()
 
     async def close(self) -> None:
@@ -110,7 +110,7 @@ class SampleQueueLink(ABC):
             return
         self._open = False
         self._queue.clear()
-        self._wake()
+        self._wakeup.wake()
         await self._disconnect()
 
     @abstractmethod
@@ -137,24 +137,10 @@ class SampleQueueLink(ABC):
             self._queue.popleft()
             self.stats.rejected[Rejection.OVERRUN] += 1
         if self._queue:
-            self._wake()
+            self._wakeup.wake()
 
     def _fail(self, error: DriverError) -> None:
         """Let `read` raise `error` once what was received before it has been read; on the event loop's thread."""
         if self._failure is None:
             self._failure = error
-        self._wake()
-
-    def _wake(self) -> None:
-        if self._waiter is not None and not self._waiter.done():
-            self._waiter.set_result(None)
-
-    async def _wait(self, timeout_s: float) -> None:
-        loop = asyncio.get_running_loop()
-        self._waiter = loop.create_future()
-        timer = loop.call_later(timeout_s, self._wake)
-        try:
-            await self._waiter
-        finally:
-            timer.cancel()
-            self._waiter = None
+        self._wakeup.wake()

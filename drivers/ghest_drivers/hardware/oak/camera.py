@@ -1,6 +1,5 @@
 """The OAK driver: device nodes, a Sync node on the host, and a thread that converts what comes out of it."""
 
-import logging
 import threading
 from datetime import timedelta
 from typing import Any
@@ -10,6 +9,7 @@ import numpy as np
 from ghest_drivers.clock import Clock
 from ghest_drivers.errors import BadDeviceData, DeviceLost, DeviceNotFound, DriverError
 from ghest_drivers.hardware.cameras.frame_queue import FrameQueue
+from ghest_drivers.hardware.cameras.session_camera import SessionCamera
 from ghest_drivers.hardware.cameras.stats import CameraStats
 from ghest_drivers.hardware.oak.frames import GroupConverter, nanoseconds
 from ghest_drivers.hardware.oak.sdk import dai
@@ -17,15 +17,12 @@ from ghest_drivers.hardware.oak.settings import OakSettings
 from ghest_drivers.hardware.oak.source import DEPTH_UNIT_M, ConnectedOak, Source
 from ghest_drivers.samples import CameraInfo, Intrinsics, RgbdFrame
 
-_log = logging.getLogger(__name__)
 _POLL = timedelta(milliseconds=100)
 _FIRST_FRAME_NS = 10_000_000_000
 
 
-class OakCamera:
+class OakCamera(SessionCamera["_Session"]):
     """An `RgbdCamera` on DepthAI.
-
-    The vendor's code runs in this process: for live use wrap it in a `SupervisedCamera`.
 
     Args:
         name: The camera's name in the station file.
@@ -35,42 +32,13 @@ class OakCamera:
     """
 
     def __init__(self, name: str, source: Source, settings: OakSettings, clock: Clock) -> None:
-        self._name = name
+        super().__init__(name)
         self._source = source
         self._settings = settings
         self._clock = clock
-        self._session: _Session | None = None
-        self._lock = threading.Lock()
-        self.stats = CameraStats()
 
-    @property
-    def info(self) -> CameraInfo:
-        """See `RgbdCamera.info`."""
-        return self._opened().info
-
-    def open(self) -> None:
-        """See `RgbdCamera.open`; also raises DriverError where the device lacks what the settings ask for."""
-        with self._lock:
-            if self._session is None:
-                self._session = _Session(self._name, self._source, self._settings, self._clock, self.stats)
-
-    def read(self, timeout_s: float) -> RgbdFrame:
-        """See `RgbdCamera.read`."""
-        return self._opened().queue.get(timeout_s)
-
-    def close(self) -> None:
-        """See `RgbdCamera.close`."""
-        with self._lock:
-            session, self._session = self._session, None
-        if session is not None:
-            session.close()
-            _log.info("camera %s: %s", self._name, self.stats.summary())
-
-    def _opened(self) -> "_Session":
-        session = self._session
-        if session is None:
-            raise DeviceLost(f"camera {self._name} is not open")
-        return session
+    def _start(self) -> "_Session":
+        return _Session(self._name, self._source, self._settings, self._clock, self.stats)
 
 
 class _Session:
@@ -80,7 +48,7 @@ class _Session:
         self._name = name
         self._source = source
         self._clock = clock
-        self.queue = FrameQueue(settings.queue_frames, stats)
+        self._queue = FrameQueue(settings.queue_frames, stats)
         self._closing = threading.Event()
         self._pump: threading.Thread | None = None
         self._pipeline: dai.Pipeline | None = None
@@ -108,10 +76,14 @@ class _Session:
         self._pump = threading.Thread(target=self._run, name=f"oak-{name}", daemon=True)
         self._pump.start()
 
+    def read(self, timeout_s: float) -> RgbdFrame:
+        """See `RgbdCamera.read`."""
+        return self._queue.get(timeout_s)
+
     def close(self) -> None:
         """Stop the nodes and let go of the device."""
         self._closing.set()
-        self.queue.close()
+        self._queue.close()
         if self._pump is not None:
             self._pump.join()
         if self._pipeline is not None and self._pipeline.isRunning():
@@ -124,7 +96,7 @@ class _Session:
         while self._clock.now_ns() < deadline_ns:
             frame = self._next_frame()
             if frame is not None:
-                self.queue.put(frame)
+                self._queue.put(frame)
                 return frame.info
         raise DeviceLost(f"camera {self._name} was opened, but no pair of images came within {_FIRST_FRAME_NS * 1e-9:.0f} s")
 
@@ -133,13 +105,13 @@ class _Session:
             try:
                 frame = self._next_frame()
             except BadDeviceData as error:
-                self.queue.put(error)
+                self._queue.put(error)
             except Exception as error:  # the SDK's own, whatever they are: X_LINK_ERROR above all
-                self.queue.end(DeviceLost(f"camera {self._name}: {error}"))
+                self._queue.end(DeviceLost(f"camera {self._name}: {error}"))
                 return
             else:
                 if frame is not None:
-                    self.queue.put(frame)
+                    self._queue.put(frame)
 
     def _next_frame(self) -> RgbdFrame | None:
         """Return the next frame; None if there was none for a while, or it was not usable."""

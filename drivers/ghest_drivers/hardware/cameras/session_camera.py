@@ -1,0 +1,81 @@
+"""What drivers on a vendor library share: a session from `open` to `close`, guarded against both being called at once."""
+
+import logging
+import threading
+from abc import ABC, abstractmethod
+from typing import Generic, Protocol, TypeVar
+
+from ghest_drivers.errors import DeviceLost
+from ghest_drivers.hardware.cameras.stats import CameraStats
+from ghest_drivers.samples import CameraInfo, RgbdFrame
+
+_log = logging.getLogger(__name__)
+
+
+class CameraSession(Protocol):
+    """A running device."""
+
+    @property
+    def info(self) -> CameraInfo:
+        """The camera's facts, as the device tells them."""
+        ...
+
+    def read(self, timeout_s: float) -> RgbdFrame:
+        """See `RgbdCamera.read`."""
+        ...
+
+    def close(self) -> None:
+        """Stop and release the device."""
+        ...
+
+
+Running = TypeVar("Running", bound=CameraSession)
+
+
+class SessionCamera(ABC, Generic[Running]):
+    """Base of the camera drivers: implements `RgbdCamera` but for starting the device.
+
+    The vendor's code runs in this process: for live use wrap it in a `SupervisedCamera`.
+
+    Args:
+        name: The camera's name in the station file.
+    """
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+        self._session: Running | None = None
+        self._lock = threading.Lock()
+        self.stats = CameraStats()
+
+    @property
+    def info(self) -> CameraInfo:
+        """See `RgbdCamera.info`."""
+        return self._opened().info
+
+    def open(self) -> None:
+        """See `RgbdCamera.open`; also raises DriverError where the device lacks what the settings ask for."""
+        with self._lock:
+            if self._session is None:
+                self._session = self._start()
+
+    def read(self, timeout_s: float) -> RgbdFrame:
+        """See `RgbdCamera.read`."""
+        return self._opened().read(timeout_s)
+
+    def close(self) -> None:
+        """See `RgbdCamera.close`."""
+        with self._lock:
+            session, self._session = self._session, None
+        if session is not None:
+            session.close()
+            _log.info("camera %s: %s", self._name, self.stats.summary())
+
+    @abstractmethod
+    def _start(self) -> Running:
+        """Start the device."""
+
+    def _opened(self) -> Running:
+        session = self._session
+        if session is None:
+            raise DeviceLost(f"camera {self._name} is not open")
+        return session
