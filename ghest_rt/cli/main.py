@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from ghest_rt.cli.options import Faults, MarkerTexture, Method, Movement, Sensor, Shifts, Side, SoftTissue, Turns
+from ghest_rt.cli.study.app import app as study_app
 from ghest_rt.errors import GhestError
 
 app = typer.Typer(
@@ -21,6 +22,8 @@ app = typer.Typer(
         "Try it without hardware: [bold]ghest-rt --replay sim_fixtures/[/] and, in a second terminal, [bold]ghest-rt listen[/]"
     ),
 )
+
+app.add_typer(study_app)
 
 _MOVEMENTS = "|".join(Movement)
 _Recording = Annotated[Path, typer.Argument(metavar="RECORDING", help="Recording (.mcap)", show_default=False)]

@@ -1,0 +1,1 @@
+"""`ghest-rt study`: the tables and figures of the evaluation, made from nothing."""

@@ -1,0 +1,14 @@
+"""The commands of `ghest-rt study`; each is in a file of its own and imports what it needs when it runs."""
+
+import typer
+
+from ghest_rt.cli.study.accuracy import accuracy
+from ghest_rt.cli.study.sensitivity import sensitivity
+
+app = typer.Typer(
+    name="study",
+    no_args_is_help=True,
+    help="Make the evaluation's tables and figures from nothing, the paper's values beside (needs the extra 'study').",
+)
+app.command()(accuracy)
+app.command()(sensitivity)

@@ -1,0 +1,56 @@
+"""Options that the studies share."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ghest_rt.cli.options import Movement
+
+_MOVEMENTS = "|".join(Movement)
+
+Movements = Annotated[
+    list[Movement] | None,
+    typer.Option(
+        "--movement",
+        help="Only this movement of Table 2; again for more. By default all four",
+        show_default=False,
+        case_sensitive=False,
+        metavar=_MOVEMENTS,
+    ),
+]
+Motions = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--motion",
+        metavar="FILE",
+        help="OpenSim motion file (.mot) of a shoulder instead of the paper's movements; again for more",
+        show_default=False,
+    ),
+]
+Out = Annotated[
+    Path,
+    typer.Option(
+        metavar="FOLDER", help="Results, and what is done so far: the same command again goes on where it was interrupted"
+    ),
+]
+Workers = Annotated[
+    int | None,
+    typer.Option(min=1, metavar="N", help="Processes on this machine; by default one per core", show_default=False),
+]
+Scheduler = Annotated[
+    str | None,
+    typer.Option(
+        metavar="ADDRESS",
+        help="Run on a Dask cluster instead: its scheduler, such as tcp://node1:8786 (extra 'cluster')",
+        show_default=False,
+    ),
+]
+Duration = Annotated[
+    float | None,
+    typer.Option("--duration", min=0.1, metavar="SECONDS", help="Only the first seconds of every movement", show_default=False),
+]
+Quick = Annotated[bool, typer.Option("--quick", metavar="", help="A small version of the study, to see that it works")]
+Json = Annotated[
+    bool, typer.Option("--json", metavar="", help="Print one JSON document on standard output and nothing else there")
+]
