@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from ghest_rt.cli.options import Faults, MarkerTexture, Method, Movement, Sensor, Shifts, Side, SoftTissue, Turns
+from ghest_rt.cli.options import Faults, ImageFaults, MarkerTexture, Method, Movement, Sensor, Shifts, Side, SoftTissue, Turns
 from ghest_rt.cli.study.app import app as study_app
 from ghest_rt.errors import GhestError
 
@@ -182,6 +182,7 @@ def simulate(
         SoftTissue, typer.Option(help="Skin that moves the markers on the bones (docs/disturbances.md)")
     ] = SoftTissue.NONE,
     fault: Faults = None,
+    image: ImageFaults = None,
     as_json: _Json = False,
 ) -> None:
     """Record a simulated patient in the exoskeleton, with the true angles (needs the extra 'sim')."""
@@ -192,6 +193,7 @@ def simulate(
     from ghest_rt.simulation.command import SimulateOptions
     from ghest_rt.simulation.disturbances import parse_shift, parse_turn
     from ghest_rt.simulation.faults import parse_fault
+    from ghest_rt.simulation.optics import parse_imaging
 
     shifts, turns = map(parse_shift, marker_shift or ()), map(parse_turn, marker_turn or ())
     simulate_recording(
@@ -209,6 +211,7 @@ def simulate(
             marker_moves=(*shifts, *turns),
             soft_tissue=soft_tissue.value,
             faults=tuple(map(parse_fault, fault or ())),
+            imaging=parse_imaging(image or ()),
         ),
         as_json,
     )

@@ -81,3 +81,15 @@ Faults = Annotated[
         show_default=False,
     ),
 ]
+ImageFaults = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--image",
+        metavar="KIND[:VALUE]",
+        help=(
+            "What is wrong with the images: bayer, defocus:0.8, motion-blur:0.008, distortion:-0.05, untold-distortion:0.01, "
+            "wrong-color:12, gain:1.1 or gamma:1.2; again for more (docs/disturbances.md)"
+        ),
+        show_default=False,
+    ),
+]

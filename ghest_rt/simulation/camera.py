@@ -1,6 +1,7 @@
 """A simulated RGB-D camera: frames of the moving clinic, each depending on seed and frame number alone."""
 
 from dataclasses import dataclass
+from typing import TypeVar
 
 import cv2
 import mujoco
@@ -12,7 +13,8 @@ from ghest_rt.config.station import Marker
 from ghest_rt.geometry.se3 import inverse
 from ghest_rt.geometry.so3 import Array
 from ghest_rt.simulation.clinic import Clinic
-from ghest_rt.simulation.imaging import ColorSensor, DepthSensor, Float32, Light
+from ghest_rt.simulation.imaging import ColorSensor, DepthSensor, Light
+from ghest_rt.simulation.optics import Float32, Imaging, aperture_px
 from ghest_rt.simulation.plate import PlateShader
 from ghest_rt.simulation.rays import PixelRays, Region
 from ghest_rt.simulation.sensors import CameraProfile
@@ -21,6 +23,9 @@ from ghest_rt.simulation.timeline import Timeline
 from ghest_rt.simulation.tracing import Hits, Tracer, shade
 
 _REGION_MARGIN_PX = 6.0
+_BLURRED_SUPERSAMPLING = 4  # where every point of the circle of confusion adds its own samples
+
+_Colors = TypeVar("_Colors", Float32, Array)
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,6 +67,7 @@ class SimulatedCamera:
         texture: What is printed on it.
         profile: What kind of camera it is.
         light: The light in the room.
+        imaging: What goes wrong with the colour images.
         timeline: Where the movement is in the recording.
         seed: Seeds noise, phase and jitter, with the camera's name.
     """
@@ -76,9 +82,11 @@ class SimulatedCamera:
         texture: Texture,
         profile: CameraProfile,
         light: Light,
+        imaging: Imaging,
         timeline: Timeline,
         seed: int,
     ) -> None:
+        profile = imaging.profile(profile)
         self.info: CameraInfo = profile.info(name)
         self._clinic = clinic
         self._marker_name = marker_name
@@ -88,11 +96,13 @@ class SimulatedCamera:
         rng = np.random.default_rng(self._seed)
         self._phase_s = 0.0 if profile.synchronous else float(rng.uniform(0.0, 1.0 / profile.rate_hz))
         self._device_offset_ns = 0 if profile.synchronous else int(rng.integers(0, 10**9))
-        self._color_sensor = ColorSensor(profile, light, rng)
+        self._color_sensor = ColorSensor(profile, light, imaging, rng)
         self._depth_sensor = DepthSensor(profile, rng)
-        self._color_rays = PixelRays(profile.color)
+        self._color_rays = PixelRays(imaging.lens(profile.color))
         self._depth_rays = self._color_rays if profile.depth_is_registered else PixelRays(profile.depth)
-        self._shader = PlateShader(texture, marker.plate_m, profile.supersampling)
+        supersampling = min(profile.supersampling, _BLURRED_SUPERSAMPLING) if imaging.defocus_px else profile.supersampling
+        self._shader = PlateShader(texture, marker.plate_m, supersampling, aperture_px(imaging.defocus_px))
+        self._defocus_px = imaging.defocus_px
         self._tracer = Tracer(clinic.scene.model, marker_name)
         self._data = mujoco.MjData(clinic.scene.model)
 
@@ -173,7 +183,8 @@ class SimulatedCamera:
         colors = None
         if colored:
             coarse = self._tracer.colors(hits).reshape(*small, 3).astype(np.float32)
-            colors = np.asarray(cv2.resize(coarse, (width, height), interpolation=cv2.INTER_LINEAR), dtype=np.float32)
+            whole = np.asarray(cv2.resize(coarse, (width, height), interpolation=cv2.INTER_LINEAR), dtype=np.float32)
+            colors = self._defocused(whole)
         z = _enlarge(hits.z_m.reshape(small), step, height, width)
         wants_facing = self._profile.depth_holes and not (colored and not self._profile.depth_is_registered)
         facing = (
@@ -194,11 +205,18 @@ class SimulatedCamera:
             rest = _facing(near, e_from_camera, rays, *region.slices).reshape(shape)
             facing[region.slices] = np.where(cover.inside & unhidden, plate, rest)
         if colors is not None:
-            background = self._tracer.colors(near).reshape(*shape, 3)
+            background = self._defocused(self._tracer.colors(near).reshape(*shape, 3))
             brightness = float(shade(normal[None])[0])
             drawn = [self._shader.draw(rays, region, pose, background, brightness) for pose in exposures]
             colors[region.slices] = np.where(unhidden[..., None], np.mean(drawn, axis=0), background)
         return _Picture(colors, z, facing)
+
+    def _defocused(self, background: _Colors) -> _Colors:
+        if not self._defocus_px:
+            return background
+        # As wide as the circle of confusion, whose variance along an axis is a quarter of its squared radius.
+        cv2.GaussianBlur(background, (0, 0), self._defocus_px / 2, dst=background)
+        return background
 
     def _cast(self, e_from_camera: Array, rays: PixelRays, rows: slice, columns: slice) -> Hits:
         return self._tracer.cast(self._data, e_from_camera, rays.directions(rows, columns))

@@ -4,7 +4,7 @@ import shlex
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import Literal
@@ -21,6 +21,7 @@ from ghest_rt.simulation.fitting import fit_station
 from ghest_rt.simulation.imaging import Light
 from ghest_rt.simulation.opensim_file import read_motion_table
 from ghest_rt.simulation.opensim_motion import OpenSimMotion
+from ghest_rt.simulation.optics import Imaging
 from ghest_rt.simulation.posture import Motion
 from ghest_rt.simulation.sensors import find_sensors
 from ghest_rt.simulation.soft_tissue import find_soft_tissue
@@ -57,6 +58,7 @@ class SimulateOptions:
         marker_moves: Markers that are not where the calibration says.
         soft_tissue: How skin moves the markers.
         faults: What the devices fail to deliver.
+        imaging: What goes wrong with the colour images.
     """
 
     out: Path
@@ -74,6 +76,7 @@ class SimulateOptions:
     marker_moves: tuple[MarkerMove, ...] = ()
     soft_tissue: SoftTissueName = "none"
     faults: tuple[DeviceFault, ...] = ()
+    imaging: Imaging = field(default_factory=Imaging)
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,6 +132,7 @@ def build_world(options: SimulateOptions) -> World:
         duration_s=options.duration_s,
         marker_moves=options.marker_moves,
         soft_tissue=find_soft_tissue(options.soft_tissue),
+        imaging=options.imaging,
     )
 
 
@@ -249,6 +253,7 @@ def _disturbances(options: SimulateOptions) -> dict[str, str]:
         "marker_turn": [move.text for move in options.marker_moves if move.kind == "turn"],
         "soft_tissue": [] if options.soft_tissue == "none" else [options.soft_tissue],
         "fault": [fault.text for fault in options.faults],
+        "image": list(options.imaging.texts),
     }
     return {name: " ".join(texts) for name, texts in given.items() if texts}
 
@@ -295,4 +300,6 @@ def _command(options: SimulateOptions) -> str:
         words += ["--soft-tissue", options.soft_tissue]
     for fault in options.faults:
         words += ["--fault", fault.text]
+    for text in options.imaging.texts:
+        words += ["--image", text]
     return shlex.join([*words, "--out", options.out.name])

@@ -8,14 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ghest_rt.geometry.so3 import Array
+from ghest_rt.simulation.optics import Float32, Imaging
 from ghest_rt.simulation.sensors import CameraProfile
 
 _TILE_MARGIN_PX = 96
 _EDGE_M = 0.008
 _GRAZING_COSINE = 0.25
 _DROPOUT_SIGMAS = 2.9  # one pixel in 270 measures nothing
-
-Float32 = NDArray[np.float32]
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,9 +33,10 @@ class Light:
 class ColorSensor:
     """Turns ideal colours into 8-bit values. Noise comes from a tile, shifted at random for each frame."""
 
-    def __init__(self, profile: CameraProfile, light: Light, rng: np.random.Generator) -> None:
+    def __init__(self, profile: CameraProfile, light: Light, imaging: Imaging, rng: np.random.Generator) -> None:
         k = profile.color
-        self._gain = light.brightness * np.array(light.white_balance)
+        self._imaging = imaging
+        self._gain = imaging.gain * light.brightness * np.array(light.white_balance)
         self._drift = profile.light_drift
         self._phase = rng.uniform(0.0, 2 * math.pi, 4)
         self._rate_hz = rng.uniform(0.05, 0.15, 4)
@@ -55,7 +55,7 @@ class ColorSensor:
         image = ideal * light
         if self._noise is not None:
             image += _cut(self._noise, ideal.shape[0], ideal.shape[1], rng)
-        return np.asarray(cv2.convertScaleAbs(np.maximum(image, 0.0)), dtype=np.uint8)
+        return np.asarray(cv2.convertScaleAbs(np.maximum(self._imaging.develop(image), 0.0)), dtype=np.uint8)
 
 
 class DepthSensor:

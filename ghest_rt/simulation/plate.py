@@ -33,14 +33,17 @@ class PlateShader:
         texture: What is printed on it.
         plate_m: Side of the plate.
         supersampling: Samples per pixel side where a pixel holds an edge.
+        aperture_px: (n, 2) points of the circle of confusion, each of which adds its own picture; the origin alone if sharp.
     """
 
-    def __init__(self, texture: Texture, plate_m: float, supersampling: int) -> None:
+    def __init__(self, texture: Texture, plate_m: float, supersampling: int, aperture_px: Array) -> None:
         self._texture = texture
         self._half_m = plate_m / 2
         steps = (np.arange(supersampling) + 0.5) / supersampling - 0.5
         dv, du = np.meshgrid(steps, steps, indexing="ij")
-        self._du, self._dv = du.ravel(), dv.ravel()
+        self._du = (du.ravel() + aperture_px[:, :1]).ravel()
+        self._dv = (dv.ravel() + aperture_px[:, 1:]).ravel()
+        self._reach_px = _PIXEL_REACH + float(np.hypot(*aperture_px.T).max())
 
     def corners_m(self, camera_from_marker: Array) -> Array:
         """Return the plate's (4, 3) corners in camera axes."""
@@ -72,7 +75,7 @@ class PlateShader:
         px, py = _on_plate(x, y, camera_from_marker)
         beyond = np.maximum(np.abs(px), np.abs(py)) - self._half_m
         pixel_m = float(np.abs(rays.step_u[region.v0, region.u0]).max()) * float(p[2])
-        reach = _PIXEL_REACH * pixel_m / facing
+        reach = self._reach_px * pixel_m / facing
         touched = np.flatnonzero(beyond < reach)
         near = np.minimum(self._texture.edge_distance_m(px[touched], py[touched]), np.abs(beyond[touched])) < reach
         plain, edge = touched[~near], touched[near]

@@ -6,6 +6,8 @@ import numpy as np
 from ghest_drivers.samples import CameraInfo, EncoderInfo, EncoderSample, RgbdFrame
 from ghest_rt.config.load import LoadedStation
 from ghest_rt.errors import BadInputError
+from ghest_rt.geometry.se3 import inverse
+from ghest_rt.geometry.so3 import Array
 from ghest_rt.messages.results import TruthSample
 from ghest_rt.simulation.anatomy import Anatomy
 from ghest_rt.simulation.attachment import Attachment
@@ -15,6 +17,7 @@ from ghest_rt.simulation.coupling import ExoskeletonMotion
 from ghest_rt.simulation.disturbances import MarkerMove
 from ghest_rt.simulation.encoders import LEAD_S, SimulatedEncoders
 from ghest_rt.simulation.imaging import Light
+from ghest_rt.simulation.optics import Imaging
 from ghest_rt.simulation.posture import Motion
 from ghest_rt.simulation.scene import build_scene
 from ghest_rt.simulation.sensors import SensorSet
@@ -41,6 +44,7 @@ class World:
         duration_s: How much of the movement; None for all of it.
         marker_moves: Markers that are not where the calibration says.
         soft_tissue: How skin moves the markers; None for markers fixed to the bones.
+        imaging: What goes wrong with the colour images; None for nothing.
 
     Raises:
         BadInputError: The duration is not positive, or the station's URDF or encoder joints cannot be simulated.
@@ -60,6 +64,7 @@ class World:
         duration_s: float | None = None,
         marker_moves: tuple[MarkerMove, ...] = (),
         soft_tissue: SoftTissue | None = None,
+        imaging: Imaging | None = None,
     ) -> None:
         if duration_s is not None and not duration_s > 0:
             raise BadInputError(f"duration {duration_s} s: give a positive number of seconds")
@@ -80,15 +85,18 @@ class World:
         self.timeline = Timeline(duration)
         attachment = Attachment(scene, marker_moves, soft_tissue) if disturbed else None
         self._clinic = Clinic(scene, config, motion, exoskeleton, attachment)
+        imaging = imaging or Imaging()
+        printed = {marker: imaging.printed(config.markers[marker], marker, seed) for marker in config.markers}
         self._cameras = {
             name: SimulatedCamera(
                 self._clinic,
                 name,
                 marker_name=camera.marker,
                 marker=config.markers[camera.marker],
-                texture=make_texture(texture, config.markers[camera.marker], camera.marker),
+                texture=make_texture(texture, printed[camera.marker], camera.marker),
                 profile=sensors.camera,
                 light=light or Light(),
+                imaging=imaging,
                 timeline=self.timeline,
                 seed=seed,
             )
@@ -101,6 +109,12 @@ class World:
     def camera_names(self) -> tuple[str, ...]:
         """The cameras."""
         return tuple(self._cameras)
+
+    def camera_from_marker(self, name: str, t_ns: int) -> Array:
+        """Return the true pose (4, 4) of a camera's marker in it at any instant. For one thread at a time."""
+        self._clinic.place(self._data, self.timeline.movement_s(t_ns))
+        marker = self.station.config.cameras[name].marker
+        return inverse(self._clinic.e_from_camera(self._data, name)) @ self._clinic.e_from_marker(self._data, marker)
 
     def camera_info(self, name: str) -> CameraInfo:
         """Return what is fixed about a camera."""
