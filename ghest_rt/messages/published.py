@@ -14,6 +14,8 @@ Vector3 = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 NonNegative = Annotated[float, Field(ge=0.0)]
 
+RUN_ID = "Of the publishing process, made anew at every start: with another one, seq starts again at 0"
+
 
 class _Message(BaseModel):
     """The base of every message: refuses unknown fields, cannot be changed once made."""
@@ -60,7 +62,8 @@ class GhAngles(_Message):
     """The glenohumeral joint at one instant: `ghest/<station>/gh/angles`. Without angles when the status is `lost`."""
 
     schema_version: Literal[1] = 1
-    seq: int = Field(ge=0, description="Counts every message of this publisher since it started; a gap is a lost message")
+    run_id: str = Field(description=RUN_ID)
+    seq: int = Field(ge=0, description="Counts every message of this run; a gap is a lost message")
     t_sample_ns: int = Field(description="Instant the angles hold for, host monotonic clock, on an absolute grid")
     t_publish_ns: int = Field(description="Instant of publishing, same clock")
     t_sample_unix_ns: int = Field(description="t_sample_ns as Unix time")
@@ -155,6 +158,7 @@ class Event(_Message):
     """Something worth knowing happened: `ghest/<station>/events`."""
 
     schema_version: Literal[1] = 1
+    run_id: str = Field(description=RUN_ID)
     seq: int = Field(ge=0)
     t_ns: int = Field(description="Host monotonic clock")
     t_unix_ns: int

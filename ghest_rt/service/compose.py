@@ -1,6 +1,7 @@
 """From an estimate (radians, metres) to the message published (degrees, ages)."""
 
 import math
+import secrets
 from typing import Literal
 
 from ghest_rt.estimation.angles import Arm, clinical, euler_yxz
@@ -33,9 +34,14 @@ def clinical_deg(gh_from_arm: Array, arm: Arm) -> Clinical:
 
 
 class Numbering:
-    """Sequence numbers of the messages of one process, per kind; runs of the service one after the other share it."""
+    """Sequence numbers of the messages of one process, per kind; runs of the service one after the other share it.
+
+    Attributes:
+        run_id: Tells subscribers that another process counts anew.
+    """
 
     def __init__(self) -> None:
+        self.run_id = secrets.token_hex(4)
         self._next = dict.fromkeys(("angles", "health", "events"), 0)
 
     def take(self, kind: Literal["angles", "health", "events"]) -> int:
@@ -72,6 +78,7 @@ class AnglesComposer:
         """Return the message for an estimate about to be published at `t_publish_ns`."""
         R, newest_ns = estimate.gh_from_arm, estimate.newest_ns
         common = {
+            "run_id": self.numbering.run_id,
             "seq": self.numbering.take("angles"),
             "t_sample_ns": estimate.t_sample_ns,
             "t_publish_ns": t_publish_ns,

@@ -269,6 +269,7 @@ class Service:
         _log.log(_LEVELS[severity], "%s: %s: %s", source, kind.replace("_", " "), text, extra=fields)
         t_ns = self._clock.now_ns()
         message = Event(
+            run_id=self._composer.numbering.run_id,
             seq=self._composer.numbering.take("events"),
             t_ns=t_ns,
             t_unix_ns=self._composer.unix_ns(t_ns),
