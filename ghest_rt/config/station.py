@@ -65,7 +65,23 @@ class Camera(Strict):
 
     link: str = Field(description="URDF link the camera is fixed to")
     marker: Name
+    depth: bool = Field(default=True, description="false: work from colour alone; the device needs no depth stream")
     device: CameraBackend = Field(discriminator="backend")
+
+
+class Elbow(Strict):
+    """Where the forearm is on the exoskeleton, for the elbow's angles."""
+
+    link: str = Field(description="URDF link that the forearm is strapped to")
+    axis: tuple[float, float, float] = Field(description="Direction from elbow to wrist in that link's frame")
+    axis_sigma_deg: float = Field(default=3.0, gt=0, le=45, description="How well the forearm follows that axis")
+    pronation_joint: str | None = Field(default=None, description="One of encoders.joints: hand against forearm module")
+
+    @model_validator(mode="after")
+    def _directed(self) -> "Elbow":
+        if not 0.99 <= float(np.linalg.norm(self.axis)) <= 1.01:
+            raise ValueError("axis must be of length 1")
+        return self
 
 
 class Encoders(Strict):
@@ -122,6 +138,7 @@ class StationConfig(Strict):
     cameras: dict[Name, Camera]
     encoders: Encoders
     calibration: Calibration
+    elbow: Elbow | None = None
     estimator: Estimator = Estimator()
     publisher: Publisher = Publisher()
 
@@ -139,4 +156,7 @@ class StationConfig(Strict):
         for camera, marker in (("r0", "m0"), ("r1", "m1")):
             if self.cameras[camera].marker != marker:
                 raise ValueError(f"cameras.{camera}.marker must be {marker}: r0 sees the acromion, r1 the upper arm")
+        pronation = self.elbow.pronation_joint if self.elbow is not None else None
+        if pronation is not None and pronation not in self.encoders.joints:
+            raise ValueError(f"elbow.pronation_joint {pronation} is not one of encoders.joints")
         return self

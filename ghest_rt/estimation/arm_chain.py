@@ -14,11 +14,12 @@ from ghest_rt.estimation.arm import (
     gh_from_arm_rotation,
     step3_4_5_e_from_arm,
 )
+from ghest_rt.estimation.elbow import ElbowGeometry
 from ghest_rt.estimation.uncertainty import covariance_in_e, euler_sigma_rad, rotation_jacobians
 from ghest_rt.geometry.so3 import Array
 from ghest_rt.kinematics.forward import ForwardKinematics
 from ghest_rt.kinematics.paper_chain import eq6_e_from_camera, eq7_e_from_marker
-from ghest_rt.messages.results import GhEstimate, MarkerObservation, MarkerStatus, Reason, Status
+from ghest_rt.messages.results import ElbowAngles, GhEstimate, MarkerObservation, MarkerStatus, Reason, Status
 from ghest_rt.sync.encoder_track import JointState
 from ghest_rt.sync.pose_track import PoseSample
 
@@ -50,15 +51,19 @@ class ArmChain:
                 "make the station file agree with the link, in the same order"
             )
         self._link = {camera: config.cameras[camera].link for camera in CAMERAS}
+        forearm = () if config.elbow is None else (config.elbow.link,)
         self._fk = ForwardKinematics(
             urdf_text,
             source,
             base_link=config.exoskeleton.base_link,
-            links=tuple(self._link.values()),
+            links=(*self._link.values(), *forearm),
             settings_m=config.exoskeleton.settings_m,
             measured_joints=encoder_joints,
         )
         self.limits = self._fk.limits
+        self._elbow = (
+            None if config.elbow is None else ElbowGeometry(config.elbow, config.station.arm, self._fk, encoder_joints)
+        )
         self._link_from_camera = {camera: config.calibration.link_from_camera_array(camera) for camera in CAMERAS}
         self.m0_from_gh = np.array(config.calibration.m0_from_gh)
         self.m1_from_elw = np.array(config.calibration.m1_from_elw)
@@ -116,7 +121,9 @@ class ArmChain:
             encoders_ns=None if joints is None else joints.newest_ns,
         )
 
-    def estimate(self, t_ns: int, m0: PoseSample, m1: PoseSample, newest_ns: Mapping[str, int]) -> GhEstimate:
+    def estimate(
+        self, t_ns: int, m0: PoseSample, m1: PoseSample, newest_ns: Mapping[str, int], joints: JointState | None
+    ) -> GhEstimate:
         """Return the GH joint from the two markers in E, equations (8) to (10), with status and covariance.
 
         Args:
@@ -124,6 +131,7 @@ class ArmChain:
             m0: Marker m0 in E.
             m1: Marker m1 in E.
             newest_ns: Time of the newest sample seen of each input.
+            joints: The joints at `t_ns`, for the elbow; None if they are not known.
         """
         used_ns = {**newest_ns, "r0": m0.newest_ns, "r1": m1.newest_ns}
         encoders_ns = [ns for ns in (m0.encoders_ns, m1.encoders_ns) if ns is not None]
@@ -136,10 +144,12 @@ class ArmChain:
             return lost(t_ns, Reason.UNCERTAIN, used_ns)
         m0_from_arm = eq10_m0_from_arm(m0.e_from_marker, e_from_arm)
         gh_from_arm = gh_from_arm_rotation(self.m0_from_gh, m0_from_arm)
-        covariance = None
+        covariance = of_arm = None
         if m0.covariance is not None and m1.covariance is not None:
             J_0, J_1 = rotation_jacobians(m0.e_from_marker, m1.e_from_marker, e_from_gh, e_from_elw, e_from_arm)
             covariance = J_0 @ m0.covariance @ J_0.T + J_1 @ m1.covariance @ J_1.T
+            of_arm = self._covariance_of_arm(e_from_gh[:3, :3] @ J_0, e_from_gh[:3, :3] @ J_1, m0.covariance, m1.covariance)
+        elbow = None if joints is None else self.elbow_angles(e_from_arm, joints.positions, of_arm)
         reason = self._weakness(m0, m1, gh_from_arm, covariance)
         return GhEstimate(
             t_sample_ns=t_ns,
@@ -151,7 +161,19 @@ class ArmChain:
             e_from_m1=m1.e_from_marker,
             covariance=covariance,
             newest_ns=used_ns,
+            elbow=elbow,
         )
+
+    def elbow_angles(self, e_from_arm: Array, joint_positions: Array, covariance: Array | None) -> ElbowAngles | None:
+        """Return the elbow's angles, as of `ElbowGeometry.angles`; None if the station file has no `[elbow]`."""
+        return None if self._elbow is None else self._elbow.angles(e_from_arm, joint_positions, covariance)
+
+    def _covariance_of_arm(self, J_0: Array, J_1: Array, m0: Array, m1: Array) -> Array | None:
+        """Return the (3, 3) covariance of the arm's rotation in E, from the Jacobians (E axes) of that in the GH frame."""
+        if self._elbow is None:
+            return None
+        J_0 = J_0 + np.eye(3, 6)  # without the error of the frame that the arm is told in
+        return np.asarray(J_0 @ m0 @ J_0.T + J_1 @ m1 @ J_1.T)
 
     def _weakness(self, m0: PoseSample, m1: PoseSample, gh_from_arm: Array, covariance: Array | None) -> Reason:
         """Return the gravest reason why angles that are there are not plainly valid."""

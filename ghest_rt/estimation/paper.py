@@ -48,7 +48,7 @@ class PaperEstimator:
         m0, m1 = (self._latest(camera, t_ns) for camera in CAMERAS)
         if isinstance(m0, Reason) or isinstance(m1, Reason):
             return lost(t_ns, gravest(m0, m1), self._inputs.newest_ns)
-        return self._chain.estimate(t_ns, m0, m1, self._inputs.newest_ns)
+        return self._chain.estimate(t_ns, m0, m1, self._inputs.newest_ns, self._nearest_joints(t_ns))
 
     def _latest(self, camera: str, t_ns: int) -> PoseSample | Reason:
         found = self._inputs.frames[camera].before(t_ns + EXACT_NS)

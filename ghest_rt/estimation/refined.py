@@ -73,7 +73,9 @@ class RefinedEstimator:
         m0, m1 = (self._pose(camera, t_ns) for camera in CAMERAS)
         if isinstance(m0, Reason) or isinstance(m1, Reason):
             return lost(t_ns, gravest(m0, m1), self._inputs.newest_ns)
-        return self._chain.estimate(t_ns, m0, m1, self._inputs.newest_ns)
+        joints = self._inputs.encoders.at(t_ns, self._max_gap_ns)
+        known = None if isinstance(joints, Miss) else joints
+        return self._chain.estimate(t_ns, m0, m1, self._inputs.newest_ns, known)
 
     def _pose(self, camera: str, t_ns: int) -> PoseSample | Reason:
         found = self._tracks[camera].at(t_ns, self._max_gap_ns)

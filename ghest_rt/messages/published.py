@@ -58,6 +58,34 @@ class Singular(_Message):
     azimuth: bool = Field(description="The azimuth of swing_twist_deg alone")
 
 
+class MarkerDriftState(_Message):
+    """How far a marker has moved on its bone since the calibration; axes of the marker as calibrated."""
+
+    flagged: bool = Field(description="It has moved, beyond what calibration leaves open; the angles are corrected for it")
+    probability: float = Field(ge=0.0, le=1.0, description="That it has moved; flagged above 0.5")
+    slide_mm: Vector3 = Field(description="Displacement, millimetres; to 0.01 mm")
+    slide_sigma_mm: Vector3 = Field(description="Standard deviations of slide_mm; large where the data say nothing")
+    turn_deg: Vector3 = Field(description="Rotation vector, degrees; to 0.01 degrees")
+    turn_sigma_deg: Vector3 = Field(description="Standard deviations of turn_deg")
+
+
+class Drift(_Message):
+    """The drift of both markers."""
+
+    m0: MarkerDriftState
+    m1: MarkerDriftState
+
+
+class Elbow(_Message):
+    """The elbow's angles in degrees, or their standard deviations; docs/angles.md says what they rest on."""
+
+    flexion: float = Field(
+        description="0 = stretched; angle between upper arm and forearm module about the elbow's flexion axis"
+    )
+    carrying: float = Field(description="How far the forearm module leaves the flexion plane, away from the body")
+    pronation: float | None = Field(description="Of the hand module against the forearm module; null without such an encoder")
+
+
 class GhAngles(_Message):
     """The glenohumeral joint at one instant: `ghest/<station>/gh/angles`. Without angles when the status is `lost`."""
 
@@ -82,15 +110,29 @@ class GhAngles(_Message):
     )
     method: str
     calibration_id: str
+    drift: Drift | None = Field(default=None, description="Of the markers; null when lost or where the method does not look")
+    elbow_deg: Elbow | None = Field(default=None, description="Null when lost or where the station file has no [elbow]")
+    elbow_sigma_deg: Elbow | None = Field(default=None, description="Standard deviations of elbow_deg")
 
 
 class Lateness(_Message):
-    """How late ticks came, microseconds, since the start."""
+    """How late ticks came, microseconds."""
 
     p50_us: NonNegative
     p99_us: NonNegative
     p999_us: NonNegative
     max_us: NonNegative
+
+
+class LatenessHistogram(_Message):
+    """How many ticks since the start came how late."""
+
+    le_us: tuple[float, ...] = Field(description="Upper edges of the bins, microseconds, rising")
+    ticks: tuple[int, ...] = Field(
+        description="Ticks up to each edge, all earlier bins included; `count` less the last came later"
+    )
+    count: int = Field(ge=0, description="All ticks")
+    sum_us: NonNegative = Field(description="Their lateness added up")
 
 
 class InputState(StrEnum):
@@ -113,6 +155,11 @@ class InputHealth(_Message):
     bad: int = Field(ge=0, description="Samples that could not be used")
     reopened: int = Field(ge=0, description="Times the device was opened again")
     rate_hz: NonNegative = Field(description="Over the last second")
+    age_ms: float | None = Field(
+        default=None, description="From the capture of its newest sample to this message; null if never seen"
+    )
+    refused: dict[str, int] = Field(default={}, description="What the device or its driver did not pass on, by reason")
+    temperature_c: float | None = Field(default=None, description="Of the device, where it tells")
 
 
 class Health(_Message):
@@ -127,12 +174,22 @@ class Health(_Message):
     reason: Reason
     published: int = Field(ge=0, description="Samples published")
     valid: int = Field(ge=0, description="Samples published with status valid")
+    degraded: int = Field(default=0, ge=0, description="Samples published with status degraded")
     rate_hz: NonNegative = Field(description="Published samples a second, over the last second")
     missed_ticks: int = Field(ge=0, description="Grid slots skipped because the machine was too busy")
-    lateness: Lateness
+    lateness: Lateness = Field(description="Since the start")
+    lateness_recent: Lateness | None = Field(default=None, description="Over the last 4096 ticks, about a minute")
+    lateness_histogram: LatenessHistogram | None = Field(default=None, description="Since the start")
+    unused: dict[str, int] = Field(default={}, description="Samples that the estimator did not use since the start, by reason")
     inputs: dict[str, InputHealth]
     cpu_percent: NonNegative = Field(description="Of one core, over the last second")
     memory_mb: NonNegative = Field(description="Resident")
+    threads: int = Field(default=0, ge=0)
+    open_files: int = Field(default=0, ge=0)
+    major_faults: int = Field(default=0, ge=0, description="Page faults since the start that had to wait for the disk")
+    collection_ms: NonNegative = Field(
+        default=0.0, description="Longest garbage collection since the start; never within a tick"
+    )
 
 
 class EventKind(StrEnum):
@@ -149,6 +206,8 @@ class EventKind(StrEnum):
     BAD_DATA = "bad_data"
     FRAMES_SKIPPED = "frames_skipped"
     STATUS_CHANGED = "status_changed"
+    MARKER_DRIFTED = "marker_drifted"  # a marker has moved on its bone
+    MARKER_BACK = "marker_back"  # it is where the calibration has it again
     RECORDING_DROPS = "recording_drops"  # the disk is slower than the data
     RECORDING_STOPPED = "recording_stopped"  # the disk is full or gone
     INTERNAL_ERROR = "internal_error"
@@ -164,7 +223,7 @@ class Event(_Message):
     t_unix_ns: int
     severity: Literal["info", "warning", "error"]
     kind: EventKind
-    source: str = Field(description="Input concerned (r0, r1, encoders), service, or recorder")
+    source: str = Field(description="Input concerned (r0, r1, encoders), marker (m0, m1), service, or recorder")
     message: str
 
 

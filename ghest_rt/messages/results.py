@@ -107,6 +107,23 @@ class DriftReport:
     m1: MarkerDrift
 
 
+@dataclass(frozen=True, slots=True)
+class ElbowAngles:
+    """The elbow at one instant, docs/angles.md; angles as if the arm were a right one.
+
+    Attributes:
+        flexion_rad: Angle from the stretched arm to the forearm module's axis, about the arm's x axis.
+        carrying_rad: Of that axis out of the plane of flexion, away from the body.
+        pronation_rad: Of the hand module against the forearm module; None if no encoder measures it.
+        sigma_rad: Standard deviations of flexion and carrying angle; None where the method computes none.
+    """
+
+    flexion_rad: float
+    carrying_rad: float
+    pronation_rad: float | None
+    sigma_rad: tuple[float, float] | None
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class GhEstimate:
     """The glenohumeral joint at one instant.
@@ -122,6 +139,7 @@ class GhEstimate:
         covariance: (3, 3) of the rotation error (rad, GH axes): true rotation = exp(error) gh_from_arm; None if unknown.
         newest_ns: Capture time of the newest sample used of each input ("r0", "r1", "encoders"); absent if never seen.
         drift: Whether markers have moved on their bones; None where the method does not look.
+        elbow: The elbow; None when lost, or if the station file has no `[elbow]`.
     """
 
     t_sample_ns: int
@@ -134,6 +152,7 @@ class GhEstimate:
     covariance: Array | None
     newest_ns: dict[str, int]
     drift: DriftReport | None = None
+    elbow: ElbowAngles | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -148,6 +167,7 @@ class TruthSample:
         e_from_m1: (4, 4) marker m1 as it really is, in the exoskeleton base frame.
         e_from_arm: (4, 4) upper arm frame in the exoskeleton base frame.
         joints_rad: True exoskeleton joint positions by name (metres for prismatic joints).
+        elbow_rad: The patient's true elbow flexion and pronation; None in recordings that lack them.
     """
 
     t_ns: int
@@ -157,3 +177,4 @@ class TruthSample:
     e_from_m1: Array
     e_from_arm: Array
     joints_rad: dict[str, float]
+    elbow_rad: tuple[float, float] | None = None

@@ -65,6 +65,7 @@ class TruthRow(Row):
     e_from_m1: Matrix4
     e_from_arm: Matrix4
     joints_rad: dict[str, float] = Field(description="True joint positions; metres for prismatic joints")
+    elbow_rad: tuple[float, float] | None = Field(default=None, description="The patient's elbow flexion and pronation")
 
 
 def json_schema(row: type[Row]) -> bytes:
@@ -163,6 +164,7 @@ def truth_to_json(truth: TruthSample) -> bytes:
         e_from_m1=_rows4(truth.e_from_m1),
         e_from_arm=_rows4(truth.e_from_arm),
         joints_rad=truth.joints_rad,
+        elbow_rad=truth.elbow_rad,
     )
     return row.model_dump_json().encode()
 
@@ -186,6 +188,7 @@ def truth_from_json(data: bytes | memoryview) -> TruthSample:
         e_from_m1=_rigid("e_from_m1", row.e_from_m1),
         e_from_arm=_rigid("e_from_arm", row.e_from_arm),
         joints_rad=row.joints_rad,
+        elbow_rad=row.elbow_rad,
     )
 
 

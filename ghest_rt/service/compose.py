@@ -4,13 +4,15 @@ import math
 import secrets
 from typing import Literal
 
+import numpy as np
+
 from ghest_rt.estimation.angles import Arm, clinical, euler_yxz
 from ghest_rt.estimation.isb import isb_yxy
 from ghest_rt.estimation.swing_twist import swing_twist
 from ghest_rt.estimation.uncertainty import euler_sigma_rad
 from ghest_rt.geometry.so3 import Array, quat_wxyz_from_matrix
-from ghest_rt.messages.published import Clinical, GhAngles, IsbYxy, Singular, SwingTwist
-from ghest_rt.messages.results import GhEstimate
+from ghest_rt.messages.published import Clinical, Drift, Elbow, GhAngles, IsbYxy, MarkerDriftState, Singular, SwingTwist
+from ghest_rt.messages.results import DriftReport, ElbowAngles, GhEstimate, MarkerDrift
 
 _INPUTS = ("r0", "r1", "encoders")
 
@@ -31,6 +33,43 @@ def clinical_deg(gh_from_arm: Array, arm: Arm) -> Clinical:
         abduction=math.degrees(angles.abduction_rad),
         rotation=math.degrees(angles.rotation_rad),
     )
+
+
+def drift_of(report: DriftReport | None) -> Drift | None:
+    """Return the markers' drift, millimetres and degrees, rounded for size; None if the method does not look."""
+    return None if report is None else Drift(m0=_marker_drift(report.m0), m1=_marker_drift(report.m1))
+
+
+def _marker_drift(drift: MarkerDrift) -> MarkerDriftState:
+    return MarkerDriftState(
+        flagged=drift.flagged,
+        probability=round(min(max(float(drift.probability), 0.0), 1.0), 4),
+        slide_mm=_rounded(drift.slide_m * 1e3),
+        slide_sigma_mm=_rounded(drift.slide_sigma_m * 1e3),
+        turn_deg=_rounded(np.degrees(drift.turn_rad)),
+        turn_sigma_deg=_rounded(np.degrees(drift.turn_sigma_rad)),
+    )
+
+
+def _rounded(values: Array) -> tuple[float, float, float]:
+    x, y, z = (round(value, 2) for value in values.tolist())
+    return x, y, z
+
+
+def elbow_of(elbow: ElbowAngles | None) -> tuple[Elbow | None, Elbow | None]:
+    """Return the elbow's angles and their standard deviations, degrees; None where there are none."""
+    if elbow is None:
+        return None, None
+    pronation = elbow.pronation_rad
+    angles = Elbow(
+        flexion=math.degrees(elbow.flexion_rad),
+        carrying=math.degrees(elbow.carrying_rad),
+        pronation=None if pronation is None else math.degrees(pronation),
+    )
+    if elbow.sigma_rad is None:
+        return angles, None
+    flexion, carrying = elbow.sigma_rad
+    return angles, Elbow(flexion=math.degrees(flexion), carrying=math.degrees(carrying), pronation=None)
 
 
 class Numbering:
@@ -91,6 +130,7 @@ class AnglesComposer:
         }
         if R is None or estimate.m0_from_arm is None:
             return GhAngles.model_validate(common | _NO_ANGLES)
+        elbow, elbow_sigma = elbow_of(estimate.elbow)
         euler, isb, swing = euler_yxz(R), isb_yxy(R, self._arm), swing_twist(R, self._arm)
         angles = {
             "angles_deg": clinical_deg(R, self._arm),
@@ -116,6 +156,9 @@ class AnglesComposer:
                 azimuth=swing.azimuth_near_singularity,
             ),
             "arm_position_m": tuple(estimate.m0_from_arm[:3, 3].tolist()),
+            "drift": drift_of(estimate.drift),
+            "elbow_deg": elbow,
+            "elbow_sigma_deg": elbow_sigma,
         }
         return GhAngles.model_validate(common | angles)
 

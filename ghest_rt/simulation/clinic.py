@@ -101,6 +101,7 @@ class Clinic:
             e_from_m1=self.e_from_marker(data, "m1"),
             e_from_arm=e_from_arm,
             joints_rad=self.joints(t_s),
+            elbow_rad=self._motion.at(t_s).elbow_rad,
         )
 
 

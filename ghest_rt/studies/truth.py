@@ -51,4 +51,14 @@ class TruthTrack:
                 for name, value in before.joints_rad.items()
                 if name in after.joints_rad
             },
+            elbow_rad=_between_angles(before.elbow_rad, after.elbow_rad, fraction),
         )
+
+
+def _between_angles(
+    before: tuple[float, float] | None, after: tuple[float, float] | None, fraction: float
+) -> tuple[float, float] | None:
+    if before is None or after is None:
+        return None
+    rest = 1.0 - fraction
+    return rest * before[0] + fraction * after[0], rest * before[1] + fraction * after[1]

@@ -118,6 +118,7 @@ class FusedEstimator:
         m0_from_arm = eq10_m0_from_arm(posture.e_from_gh @ inverse(m0_from_gh), e_from_arm)
         gh_from_arm = gh_from_arm_rotation(m0_from_gh, m0_from_arm)
         drift = _report(posture)
+        elbow = self._chain.elbow_angles(e_from_arm, joints.positions, posture.covariance[ARM, ARM])
         reason = self._weakness(gh_from_arm, covariance, bool(stale) or joints.gap_ns > _ENCODER_BRIDGE_NS, drift)
         return GhEstimate(
             t_sample_ns=t_ns,
@@ -130,6 +131,7 @@ class FusedEstimator:
             covariance=covariance,
             newest_ns=newest_ns,
             drift=drift,
+            elbow=elbow,
         )
 
     def _sighting(self, observation: MarkerObservation, which: int) -> Sighting | None:
