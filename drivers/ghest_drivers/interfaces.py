@@ -6,7 +6,16 @@ Encoder links are asynchronous: they end in a file descriptor or a queue that th
 
 from typing import Protocol, runtime_checkable
 
-from ghest_drivers.samples import CameraInfo, EncoderInfo, EncoderSample, RgbdFrame
+from ghest_drivers.samples import CameraInfo, DeviceVitals, EncoderInfo, EncoderSample, RgbdFrame
+
+
+@runtime_checkable
+class TellsVitals(Protocol):
+    """A camera or link that says how it is doing; optional."""
+
+    def vitals(self) -> DeviceVitals:
+        """Return what is known by now, at once and without asking the device; from any thread."""
+        ...
 
 
 @runtime_checkable

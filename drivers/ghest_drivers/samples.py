@@ -4,7 +4,8 @@ Every sample carries three times: `t_device_ns` (the device's own clock, raw), `
 `t_capture_ns` (host clock estimate of mid-exposure, or of the encoder latch): the only one that the maths uses.
 """
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +37,19 @@ class Intrinsics:
     def matrix(self) -> NDArray[np.float64]:
         """The 3x3 camera matrix K."""
         return np.array([[self.fx_px, 0.0, self.cx_px], [0.0, self.fy_px, self.cy_px], [0.0, 0.0, 1.0]])
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceVitals:
+    """How a device says it is doing.
+
+    Attributes:
+        refused: What it or its driver did not pass on since the start, by reason; reasons that never occurred may be absent.
+        temperature_c: Its temperature, degrees Celsius; None where it does not tell.
+    """
+
+    refused: Mapping[str, int] = field(default_factory=dict)
+    temperature_c: float | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -11,8 +11,8 @@ import numpy as np
 
 from ghest_drivers.clock import Clock
 from ghest_drivers.errors import BadDeviceData, DeviceLost, DriverError, EndOfStream, ReadTimeout
-from ghest_drivers.interfaces import RgbdCamera
-from ghest_drivers.samples import CameraInfo, RgbdFrame
+from ghest_drivers.interfaces import RgbdCamera, TellsVitals
+from ghest_drivers.samples import CameraInfo, DeviceVitals, RgbdFrame
 from ghest_rt.messages.published import EventKind, InputState
 from ghest_rt.messages.results import MarkerObservation
 from ghest_rt.service.inputs import InputCounters, InputListener, InputSettings, Severity
@@ -56,6 +56,10 @@ class CameraWorker:
     def go(self) -> None:
         """Let frames through; until then the camera is only opened."""
         self._go.set()
+
+    def vitals(self) -> DeviceVitals:
+        """Return what the camera says of itself."""
+        return self._camera.vitals() if isinstance(self._camera, TellsVitals) else DeviceVitals()
 
     def stop(self) -> None:
         """Ask the thread to end, without waiting; `finished` is set when it has."""
@@ -136,13 +140,13 @@ class CameraWorker:
 
     def _newest_useful(self, frame: RgbdFrame) -> RgbdFrame:
         """Pass over frames that have waited too long while a newer one is there: vision is slower than the camera."""
-        self.counters.count(frame.seq)
+        self.counters.count(frame.seq, frame.t_capture_ns)
         while self._clock.now_ns() - frame.t_arrival_ns > self._settings.max_backlog_ns:
             try:
                 newer = self._camera.read(0.0)
             except (ReadTimeout, EndOfStream):
                 break
-            self.counters.count(newer.seq)
+            self.counters.count(newer.seq, newer.t_capture_ns)
             if not self.counters.skipped:
                 self._event(EventKind.FRAMES_SKIPPED, "warning", "vision is slower than the camera: old frames are passed over")
             self.counters.skipped += 1

@@ -4,7 +4,8 @@ import asyncio
 import logging
 
 from ghest_drivers.errors import BadDeviceData, DeviceLost, DriverError, EndOfStream, ReadTimeout
-from ghest_drivers.interfaces import EncoderLink
+from ghest_drivers.interfaces import EncoderLink, TellsVitals
+from ghest_drivers.samples import DeviceVitals
 from ghest_rt.messages.published import EventKind, InputState
 from ghest_rt.service.inputs import InputCounters, InputListener, InputSettings, Severity
 
@@ -26,6 +27,10 @@ class EncoderWorker:
     def go(self) -> None:
         """Let samples through; until then the link is only opened."""
         self._go.set()
+
+    def vitals(self) -> DeviceVitals:
+        """Return what the link says of itself."""
+        return self._link.vitals() if isinstance(self._link, TellsVitals) else DeviceVitals()
 
     async def run(self) -> None:
         """Run until the link ends or the task is cancelled; closes the link."""
@@ -83,7 +88,7 @@ class EncoderWorker:
                 counters.bad += 1
                 continue
             in_vain = 0
-            counters.count(sample.seq)
+            counters.count(sample.seq, sample.t_capture_ns)
             if counters.state is not InputState.STREAMING:
                 counters.state = InputState.STREAMING
                 self._event(EventKind.INPUT_STREAMING, "info", "samples are arriving")

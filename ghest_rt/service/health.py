@@ -1,17 +1,25 @@
 """How the service itself is doing: rates, lateness, memory, processor time."""
 
 import os
+import resource
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from ghest_rt.messages.published import Health, InputHealth, Lateness
+from ghest_drivers.samples import DeviceVitals
+from ghest_rt.messages.published import Health, InputHealth, Lateness, LatenessHistogram
 from ghest_rt.messages.results import GhEstimate, Reason, Status
 from ghest_rt.service.inputs import InputCounters
 from ghest_rt.service.pacing import Pacer
+from ghest_rt.service.process import GarbageRounds
 
 _STATM = Path("/proc/self/statm")
+_TASKS = Path("/proc/self/task")
+_OPEN_FILES = Path("/proc/self/fd")
 _PAGE_BYTES = os.sysconf("SC_PAGE_SIZE")
+_PERCENTS = (50.0, 99.0, 99.9, 100.0)
+_EDGES_OCTAVES = tuple(range(4, 22))  # 16 us .. 2.1 s, each twice the one before
+_EDGES_US = tuple(float(2**octave) for octave in _EDGES_OCTAVES)
 
 
 def resident_mb() -> float:
@@ -20,6 +28,14 @@ def resident_mb() -> float:
         return int(_STATM.read_text().split()[1]) * _PAGE_BYTES / 1e6
     except OSError:
         return 0.0
+
+
+def entries(folder: Path) -> int:
+    """Return how many entries a folder of /proc has; 0 where it is missing."""
+    try:
+        return sum(1 for _ in folder.iterdir())
+    except OSError:
+        return 0
 
 
 class SampleCounts:
@@ -54,9 +70,33 @@ class SampleCounts:
 
 
 class HealthMeter:
-    """Makes Health messages; rates hold for the time since the message before."""
+    """Makes Health messages; rates hold for the time since the message before.
 
-    def __init__(self, t_start_ns: int, counts: SampleCounts, pacer: Pacer, inputs: Mapping[str, InputCounters]) -> None:
+    Args:
+        t_start_ns: Start of the run, service clock.
+        counts: What was published.
+        pacer: Who knows the lateness.
+        inputs: Counters by input.
+        vitals: What an input's device says of itself.
+        unused: Samples that the estimator did not use, by reason.
+        garbage: Who collects garbage.
+    """
+
+    def __init__(
+        self,
+        t_start_ns: int,
+        counts: SampleCounts,
+        pacer: Pacer,
+        inputs: Mapping[str, InputCounters],
+        *,
+        vitals: Callable[[str], DeviceVitals] = lambda name: DeviceVitals(),
+        unused: Callable[[], Mapping[str, int]] = dict,
+        garbage: GarbageRounds | None = None,
+    ) -> None:
+        self._vitals = vitals
+        self._unused = unused
+        self._garbage = garbage
+        self._major_faults_before = resource.getrusage(resource.RUSAGE_SELF).ru_majflt
         self._counts = counts
         self._pacer = pacer
         self._inputs = inputs
@@ -81,21 +121,30 @@ class HealthMeter:
             reason=counts.reason,
             published=counts.published,
             valid=counts.valid,
+            degraded=counts.degraded,
             rate_hz=(counts.published - self._published_last) / elapsed_s,
             missed_ticks=pacer.missed,
             lateness=lateness(pacer),
-            inputs={name: self._input(name, counters, elapsed_s) for name, counters in self._inputs.items()},
+            lateness_recent=_recent(pacer),
+            lateness_histogram=_histogram(pacer),
+            unused=dict(self._unused()),
+            inputs={name: self._input(name, counters, elapsed_s, t_ns) for name, counters in self._inputs.items()},
             cpu_percent=100.0 * (cpu_s - self._cpu_last_s) / max(wall_s - self._wall_last_s, 1e-9),
             memory_mb=resident_mb(),
+            threads=entries(_TASKS),
+            open_files=entries(_OPEN_FILES),
+            major_faults=resource.getrusage(resource.RUSAGE_SELF).ru_majflt - self._major_faults_before,
+            collection_ms=0.0 if self._garbage is None else self._garbage.longest_ms,
         )
         self._t_last_ns, self._cpu_last_s, self._wall_last_s = t_ns, cpu_s, wall_s
         self._published_last = counts.published
         return message
 
-    def _input(self, name: str, counters: InputCounters, elapsed_s: float) -> InputHealth:
+    def _input(self, name: str, counters: InputCounters, elapsed_s: float, t_ns: int) -> InputHealth:
         received = counters.received
         rate_hz = (received - self._received_last.get(name, 0)) / elapsed_s
         self._received_last[name] = received
+        vitals = self._vitals(name)
         return InputHealth(
             state=counters.state,
             received=received,
@@ -104,6 +153,9 @@ class HealthMeter:
             bad=counters.bad,
             reopened=counters.reopened,
             rate_hz=rate_hz,
+            age_ms=None if counters.newest_ns is None else (t_ns - counters.newest_ns) * 1e-6,
+            refused={reason: count for reason, count in vitals.refused.items() if count},
+            temperature_c=vitals.temperature_c,
         )
 
 
@@ -115,4 +167,16 @@ def lateness(pacer: Pacer) -> Lateness:
         p99_us=histogram.percentile_us(99.0),
         p999_us=histogram.percentile_us(99.9),
         max_us=histogram.max_us,
+    )
+
+
+def _recent(pacer: Pacer) -> Lateness:
+    p50_us, p99_us, p999_us, max_us = pacer.recent.percentiles_us(_PERCENTS)
+    return Lateness(p50_us=p50_us, p99_us=p99_us, p999_us=p999_us, max_us=max_us)
+
+
+def _histogram(pacer: Pacer) -> LatenessHistogram:
+    lateness = pacer.lateness
+    return LatenessHistogram(
+        le_us=_EDGES_US, ticks=lateness.counts_up_to(_EDGES_OCTAVES), count=lateness.count, sum_us=lateness.sum_us
     )

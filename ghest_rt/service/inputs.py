@@ -65,10 +65,12 @@ class InputCounters:
     bad: int = 0
     reopened: int = 0
     last_seq: int | None = None
+    newest_ns: int | None = None
 
-    def count(self, seq: int) -> None:
+    def count(self, seq: int, t_capture_ns: int) -> None:
         """Count a sample received, and the gap before it in the device's own numbering."""
         self.received += 1
+        self.newest_ns = t_capture_ns
         if self.last_seq is not None and seq > self.last_seq + 1:
             self.missing += seq - self.last_seq - 1
         self.last_seq = seq

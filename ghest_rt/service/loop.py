@@ -1,14 +1,14 @@
 """The service: cameras and encoders in, one sample per grid slot out, whatever happens to the devices."""
 
 import asyncio
-import gc
 import logging
+import time
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 from ghest_drivers.interfaces import EncoderLink, RgbdCamera
-from ghest_drivers.samples import CameraInfo, EncoderInfo, EncoderSample, RgbdFrame
+from ghest_drivers.samples import CameraInfo, DeviceVitals, EncoderInfo, EncoderSample, RgbdFrame
 from ghest_rt.errors import DeviceError
 from ghest_rt.messages.published import Event, EventKind, InputState
 from ghest_rt.messages.results import GhEstimate, MarkerObservation, Reason, Status
@@ -22,6 +22,7 @@ from ghest_rt.service.health import HealthMeter, SampleCounts, lateness
 from ghest_rt.service.inputs import Severity
 from ghest_rt.service.outputs import Output
 from ghest_rt.service.pacing import Pacer
+from ghest_rt.service.process import GarbageRounds
 from ghest_rt.sync.grid import Grid
 
 _log = logging.getLogger(__name__)
@@ -76,7 +77,8 @@ class Service:
         self._failure: BaseException | None = None
         self._stopping = asyncio.Event()
         self._alarm: Alarm | None = None
-        self._meter = HealthMeter(0, self._counts, self._pacer, self._counters)
+        self._garbage = GarbageRounds(time.monotonic_ns)
+        self._meter = self._new_meter(0)
         self._health_due_ns = 0
         self._told_status: Status | None = None
 
@@ -98,7 +100,7 @@ class Service:
         """
         loop = asyncio.get_running_loop()
         t_start_ns = self._clock.now_ns()
-        self._meter = HealthMeter(t_start_ns, self._counts, self._pacer, self._counters)
+        self._meter = self._new_meter(t_start_ns)
         self._health_due_ns = t_start_ns + _HEALTH_PERIOD_NS
         self._alarm = self._make_alarm(loop, self._pacer.wake)
         encoder_task = asyncio.create_task(self._encoder_worker.run(), name="encoders")
@@ -129,7 +131,7 @@ class Service:
             missed_ticks=self._pacer.missed,
             lateness=lateness(self._pacer),
             inputs=self._counters,
-            unused=self._unused + Counter(self._pipeline.counts() if self._pipeline is not None else {}),
+            unused=self._all_unused(),
         )
 
     # What the workers tell (InputListener).
@@ -193,6 +195,23 @@ class Service:
             except Exception as error:
                 self._fail(error)
 
+    def _all_unused(self) -> Counter[str]:
+        return self._unused + Counter(self._pipeline.counts() if self._pipeline is not None else {})
+
+    def _new_meter(self, t_start_ns: int) -> HealthMeter:
+        return HealthMeter(
+            t_start_ns,
+            self._counts,
+            self._pacer,
+            self._counters,
+            vitals=self._vitals,
+            unused=self._all_unused,
+            garbage=self._garbage,
+        )
+
+    def _vitals(self, name: str) -> DeviceVitals:
+        return (self._encoder_worker if name == ENCODERS else self._workers[name]).vitals()
+
     def _drop_pipeline(self) -> None:
         if self._pipeline is not None:
             self._unused.update(self._pipeline.counts())
@@ -245,8 +264,7 @@ class Service:
         if t_tick_ns >= self._health_due_ns:
             self._health_due_ns += _HEALTH_PERIOD_NS * (1 + (t_tick_ns - self._health_due_ns) // _HEALTH_PERIOD_NS)
             self._send_health(self._clock.now_ns())
-            if not gc.isenabled():
-                gc.collect(1)
+            self._garbage.collect()
 
     def _waiting(self, t_sample_ns: int) -> GhEstimate:
         """The estimate until every camera has delivered: none, and which input is waited for."""

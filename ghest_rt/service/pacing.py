@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 from ghest_rt.service.alarm import Alarm
-from ghest_rt.service.histogram import DurationHistogram
+from ghest_rt.service.histogram import DurationHistogram, RecentDurations
 from ghest_rt.sync.grid import Grid
 
 
@@ -28,6 +28,7 @@ class Pacer:
         self._grid: Grid | None = None
         self._next = 0
         self.lateness = DurationHistogram()
+        self.recent = RecentDurations()
         self.missed = 0
         self.ticks = 0
 
@@ -51,6 +52,7 @@ class Pacer:
             self.missed += due - self._next
             self.ticks += 1
             self.lateness.add(now_ns - t_ns)
+            self.recent.add(now_ns - t_ns)
             self._next = due + 1
             self._on_tick(due, t_ns)
         self._arm()
