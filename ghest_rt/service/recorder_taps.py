@@ -2,8 +2,8 @@
 
 from typing import Protocol
 
-from ghest_drivers.interfaces import EncoderLink, RgbdCamera
-from ghest_drivers.samples import CameraInfo, EncoderInfo, EncoderSample, RgbdFrame
+from ghest_drivers.interfaces import EncoderLink, RgbdCamera, TellsVitals
+from ghest_drivers.samples import CameraInfo, DeviceVitals, EncoderInfo, EncoderSample, RgbdFrame
 from ghest_rt.messages.published import Event, EventKind, GhAngles, Health
 from ghest_rt.messages.results import GhEstimate
 from ghest_rt.recording import layout
@@ -39,6 +39,10 @@ class RecordedCamera:
         """See `RgbdCamera.info`."""
         return self._camera.info
 
+    def vitals(self) -> DeviceVitals:
+        """See `TellsVitals.vitals`."""
+        return self._camera.vitals() if isinstance(self._camera, TellsVitals) else DeviceVitals()
+
     def open(self) -> None:
         """See `RgbdCamera.open`."""
         self._camera.open()
@@ -66,6 +70,10 @@ class RecordedEncoders:
     def info(self) -> EncoderInfo:
         """See `EncoderLink.info`."""
         return self._link.info
+
+    def vitals(self) -> DeviceVitals:
+        """See `TellsVitals.vitals`."""
+        return self._link.vitals() if isinstance(self._link, TellsVitals) else DeviceVitals()
 
     async def open(self) -> None:
         """See `EncoderLink.open`."""

@@ -62,5 +62,8 @@ class HostSource:
         if "d" in streams:
             self.depth.send(image(depth_of(k), 3 * k, t + skew))
 
+    def temperature_c(self) -> float:
+        return 41.0
+
     def release(self) -> None:
         self.released += 1

@@ -51,6 +51,9 @@ def here(*, name: str, clock: Clock, mxid: str, **streams: Any) -> RgbdCamera:
             self.color.send(image(scene.color[view][index], dai.ImgFrame.Type.RGB888i, number, stamp))
             self.depth.send(image(scene.depth[view][index], dai.ImgFrame.Type.RAW16, number, stamp))
 
+        def temperature_c(self) -> float:
+            return 41.0
+
         def release(self) -> None:
             """Nothing to release."""
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from ghest_drivers.clock import Clock
 from ghest_drivers.errors import BadDeviceData, DeviceLost, DeviceNotFound, EndOfStream, ReadTimeout
-from ghest_drivers.samples import CameraInfo, Intrinsics, RgbdFrame
+from ghest_drivers.samples import CameraInfo, DeviceVitals, Intrinsics, RgbdFrame
 
 INFO = CameraInfo("r0", "fake", "F1", Intrinsics(8, 6, 7, 7, 3.5, 2.5), Intrinsics(4, 3, 5, 5, 1.5, 1), 0.001, np.eye(4), 100.0)
 
@@ -82,3 +82,10 @@ def _misbehave(how: str) -> None:
         raise RuntimeError("xioctl failed")
     elif how == "stop thread":
         threading.Event().wait()
+
+
+class VitalCamera(FakeCamera):
+    """Says how it is doing."""
+
+    def vitals(self) -> DeviceVitals:
+        return DeviceVitals({"bad": 3}, 41.0)

@@ -1,10 +1,12 @@
 """A camera that delivers the same image again and again, as hung firmware and full USB buffers do, under new time stamps."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from ghest_drivers.errors import BadDeviceData, DeviceLost
-from ghest_drivers.interfaces import RgbdCamera
-from ghest_drivers.samples import CameraInfo, RgbdFrame
+from ghest_drivers.interfaces import RgbdCamera, TellsVitals
+from ghest_drivers.samples import CameraInfo, DeviceVitals, RgbdFrame
 
 _LOST_AFTER = 30
 
@@ -27,11 +29,17 @@ class FrozenWatch:
         self._lost_after = lost_after
         self._last: RgbdFrame | None = None
         self._repeated = 0
+        self._refused = 0
 
     @property
     def info(self) -> CameraInfo:
         """See `RgbdCamera.info`."""
         return self.camera.info
+
+    def vitals(self) -> DeviceVitals:
+        """See `TellsVitals.vitals`."""
+        inner = self.camera.vitals() if isinstance(self.camera, TellsVitals) else DeviceVitals()
+        return replace(inner, refused={**inner.refused, "frozen": self._refused})
 
     def open(self) -> None:
         """See `RgbdCamera.open`."""
@@ -51,6 +59,7 @@ class FrozenWatch:
             self._repeated = 0
             return frame
         self._repeated += 1
+        self._refused += 1
         if self._repeated >= self._lost_after:
             raise DeviceLost(f"camera {frame.info.name}: the image has been frozen for {self._repeated} frames")
         raise BadDeviceData(f"camera {frame.info.name}: image {frame.seq} is the one before again, to the last bit")

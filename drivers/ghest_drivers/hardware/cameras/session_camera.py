@@ -7,9 +7,10 @@ from typing import Generic, Protocol, TypeVar
 
 from ghest_drivers.errors import DeviceLost
 from ghest_drivers.hardware.cameras.stats import CameraStats
-from ghest_drivers.samples import CameraInfo, RgbdFrame
+from ghest_drivers.samples import CameraInfo, DeviceVitals, RgbdFrame
 
 _log = logging.getLogger(__name__)
+_TEMPERATURE_EVERY_NS = 2_000_000_000
 
 
 class CameraSession(Protocol):
@@ -22,6 +23,10 @@ class CameraSession(Protocol):
 
     def read(self, timeout_s: float) -> RgbdFrame:
         """See `RgbdCamera.read`."""
+        ...
+
+    def temperature_c(self) -> float | None:
+        """Ask the device for its temperature, degrees Celsius; None where it does not tell."""
         ...
 
     def close(self) -> None:
@@ -45,6 +50,8 @@ class SessionCamera(ABC, Generic[Running]):
         self._name = name
         self._session: Running | None = None
         self._lock = threading.Lock()
+        self._temperature_c: float | None = None
+        self._temperature_due_ns = 0
         self.stats = CameraStats()
 
     @property
@@ -59,8 +66,17 @@ class SessionCamera(ABC, Generic[Running]):
                 self._session = self._start()
 
     def read(self, timeout_s: float) -> RgbdFrame:
-        """See `RgbdCamera.read`."""
-        return self._opened().read(timeout_s)
+        """See `RgbdCamera.read`. Every other second it also asks for the temperature."""
+        session = self._opened()
+        frame = session.read(timeout_s)
+        if frame.t_arrival_ns >= self._temperature_due_ns:
+            self._temperature_due_ns = frame.t_arrival_ns + _TEMPERATURE_EVERY_NS
+            self._temperature_c = session.temperature_c()
+        return frame
+
+    def vitals(self) -> DeviceVitals:
+        """See `TellsVitals.vitals`."""
+        return DeviceVitals(self.stats.refused(), self._temperature_c)
 
     def close(self) -> None:
         """See `RgbdCamera.close`."""

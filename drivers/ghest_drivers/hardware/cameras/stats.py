@@ -27,6 +27,12 @@ class CameraStats:
     clock_suspect: int = 0
     bad: int = 0
 
+    def refused(self) -> dict[str, int]:
+        """Return what was not handed on, or not whole, by reason."""
+        counts = asdict(self)
+        del counts["delivered"]
+        return counts
+
     def summary(self) -> str:
         """Return one line for messages and health reports."""
         return ", ".join(f"{name} {count}" for name, count in asdict(self).items())

@@ -11,7 +11,7 @@ from ghest_drivers.hardware.encoders.channels import Channel
 from ghest_drivers.hardware.encoders.reading import RawReading
 from ghest_drivers.hardware.encoders.stats import LinkStats, Rejection
 from ghest_drivers.hardware.encoders.wakeup import Wakeup
-from ghest_drivers.samples import EncoderInfo, EncoderSample
+from ghest_drivers.samples import DeviceVitals, EncoderInfo, EncoderSample
 
 _QUEUE = 4096
 _NS_PER_S = 1_000_000_000
@@ -57,6 +57,10 @@ class SampleQueueLink(ABC):
         if not self._open:
             raise DeviceLost(f"{self._name}: the encoder link is not open")
         return self._info
+
+    def vitals(self) -> DeviceVitals:
+        """See `TellsVitals.vitals`."""
+        return DeviceVitals(self.stats.refused())
 
     async def open(self) -> None:
         """Connect; harmless if already open.

@@ -43,6 +43,11 @@ class LinkStats:
     bytes_discarded: int = 0
     rejected: Counter[Rejection] = field(default_factory=Counter)
 
+    def refused(self) -> dict[str, int]:
+        """Return what was not passed on, by reason."""
+        counts = {str(reason): count for reason, count in self.rejected.items()}
+        return counts | {"lost": self.lost, "seq_jumps": self.seq_jumps, "bytes_discarded": self.bytes_discarded}
+
     def summary(self) -> str:
         """Return one line for messages and health reports."""
         reasons = ", ".join(f"{reason} {count}" for reason, count in sorted(self.rejected.items())) or "none"

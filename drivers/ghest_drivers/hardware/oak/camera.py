@@ -80,6 +80,10 @@ class _Session:
         """See `RgbdCamera.read`."""
         return self._queue.get(timeout_s)
 
+    def temperature_c(self) -> float | None:
+        """See `CameraSession.temperature_c`."""
+        return self._source.temperature_c()
+
     def close(self) -> None:
         """Stop the nodes and let go of the device."""
         self._closing.set()

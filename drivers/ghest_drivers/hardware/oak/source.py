@@ -40,6 +40,10 @@ class Source(Protocol):
         """
         ...
 
+    def temperature_c(self) -> float | None:
+        """Return the device's temperature, degrees Celsius; None where it does not tell."""
+        ...
+
     def release(self) -> None:
         """Let go of the device; the pipeline has stopped."""
         ...
@@ -65,6 +69,10 @@ class ConnectedOak:
         sync = pipeline.create(dai.node.Sync)
         _lay_out(pipeline, device, sync, settings)
         return Images(pipeline, str(device.getProductName()), self._mxid), sync
+
+    def temperature_c(self) -> float | None:
+        """Return the mean of the chip's sensors."""
+        return None if self._device is None else float(self._device.getChipTemperature().average)
 
     def release(self) -> None:
         """Close the device."""

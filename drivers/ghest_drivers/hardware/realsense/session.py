@@ -55,6 +55,16 @@ class Session:
         """Return the next frame; see `RgbdCamera.read`."""
         return self._queue.get(timeout_s)
 
+    def temperature_c(self) -> float | None:
+        """See `CameraSession.temperature_c`."""
+        for sensor, _ in self._groups:
+            if sensor.supports(rs.option.asic_temperature):
+                try:
+                    return float(sensor.get_option(rs.option.asic_temperature))
+                except RuntimeError as error:  # busy, or gone: the frames tell
+                    _log.debug("camera %s: temperature: %s", self._name, error)
+        return None
+
     def close(self) -> None:
         """Stop and let go of every SDK object, so that the device, or the file being recorded, is closed."""
         self._queue.close()  # first: a full lossless queue holds the SDK's threads

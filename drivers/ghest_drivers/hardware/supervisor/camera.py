@@ -2,13 +2,14 @@
 
 import logging
 import threading
+from collections import Counter
 from dataclasses import dataclass
 
 from ghest_drivers.clock import Clock
 from ghest_drivers.errors import DeviceLost
 from ghest_drivers.hardware.supervisor.link import ChildLink, Limits
 from ghest_drivers.hardware.supervisor.protocol import BackendSpec
-from ghest_drivers.samples import CameraInfo, RgbdFrame
+from ghest_drivers.samples import CameraInfo, DeviceVitals, RgbdFrame
 
 _log = logging.getLogger(__name__)
 
@@ -50,6 +51,7 @@ class SupervisedCamera:
         self._lock = threading.Lock()
         self._abort = threading.Event()
         self._reset_next = False
+        self._refused_before: Counter[str] = Counter()
         self.stats = SupervisorStats()
 
     @property
@@ -65,6 +67,15 @@ class SupervisedCamera:
             DeviceLost: The camera is not open.
         """
         return self._opened().pid
+
+    def vitals(self) -> DeviceVitals:
+        """See `TellsVitals.vitals`: what the child said last, and what its predecessors had refused."""
+        link = self._link
+        newest = DeviceVitals() if link is None else link.vitals
+        refused = self._refused_before + Counter(newest.refused)
+        refused["overwritten"] += self.stats.overwritten
+        refused["processes_lost"] += self.stats.lost
+        return DeviceVitals(refused, newest.temperature_c)
 
     def open(self) -> None:
         """See `RgbdCamera.open`.
@@ -102,6 +113,7 @@ class SupervisedCamera:
             link, self._link = self._link, None
             if link is not None:
                 link.close()
+                self._refused_before.update(link.vitals.refused)
                 self.stats.overwritten += link.overwritten
 
     def _note_loss(self) -> None:

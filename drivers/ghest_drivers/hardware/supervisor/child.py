@@ -14,9 +14,11 @@ from ghest_drivers.clock import MonotonicClock
 from ghest_drivers.errors import BadDeviceData, DriverError, ReadTimeout
 from ghest_drivers.hardware.supervisor.protocol import Attach, BackendSpec, Opened, Problem
 from ghest_drivers.hardware.supervisor.ring import FrameRing
+from ghest_drivers.interfaces import TellsVitals
 
 _log = logging.getLogger(__name__)
 _READ_TIMEOUT_S = 0.1
+_VITALS_EVERY_NS = 1_000_000_000
 
 
 def run(name: str, spec: BackendSpec, control: Connection, wake: Connection, reset: bool) -> None:
@@ -60,9 +62,14 @@ def _reset(camera: Any) -> None:
 
 
 def _stream(camera: Any, ring: FrameRing, control: Connection, wake: Connection, stop: threading.Event) -> None:
+    clock = MonotonicClock()
+    vitals_due_ns = 0
     while not stop.is_set():
         try:
             ring.put(camera.read(_READ_TIMEOUT_S))
+            if clock.now_ns() >= vitals_due_ns and isinstance(camera, TellsVitals):
+                vitals_due_ns = clock.now_ns() + _VITALS_EVERY_NS
+                control.send(camera.vitals())
         except ReadTimeout:
             continue
         except (BadDeviceData, ValueError) as error:

@@ -15,7 +15,7 @@ from ghest_drivers.errors import BadDeviceData, DeviceLost, DriverError, ReadTim
 from ghest_drivers.hardware.supervisor import child
 from ghest_drivers.hardware.supervisor.protocol import Attach, BackendSpec, Opened, Problem, Stop
 from ghest_drivers.hardware.supervisor.ring import FrameRing, RingLayout
-from ghest_drivers.samples import CameraInfo, RgbdFrame
+from ghest_drivers.samples import CameraInfo, DeviceVitals, RgbdFrame
 
 _log = logging.getLogger(__name__)
 _POLL_S = 0.05
@@ -60,6 +60,7 @@ class ChildLink:
         self._failure: DriverError | None = None
         self._closed = False
         self.overwritten = 0
+        self.vitals = DeviceVitals()
         self._reading = threading.Lock()
         self._ring: FrameRing | None = None
         self._control, child_control = _SPAWN.Pipe()
@@ -121,7 +122,7 @@ class ChildLink:
         message = self._receive()
         if isinstance(message, Opened):
             return message.info
-        raise message
+        raise message if isinstance(message, DriverError) else DeviceLost(f"camera {self._name}: unexpected {message!r}")
 
     def _next_frame(self) -> RgbdFrame | None:
         """Return what is in the ring; only when that is empty, raise what ended the stream."""
@@ -154,17 +155,19 @@ class ChildLink:
             message = self._receive()
             if isinstance(message, BadDeviceData):
                 raise message
-            if isinstance(message, DriverError):
+            if isinstance(message, DeviceVitals):
+                self.vitals = message
+            elif isinstance(message, DriverError):
                 self._failure = message
         elif self._process.sentinel in ready:
             self._failure = DeviceLost(f"camera {self._name}: its process {self._how_it_ended()}")
 
-    def _receive(self) -> Opened | DriverError:
+    def _receive(self) -> Opened | DeviceVitals | DriverError:
         try:
             message = self._control.recv()
         except (EOFError, OSError):
             return DeviceLost(f"camera {self._name}: its process {self._how_it_ended()}")
-        if isinstance(message, Opened):
+        if isinstance(message, Opened | DeviceVitals):
             return message
         return message.error() if isinstance(message, Problem) else DeviceLost(f"camera {self._name}: unexpected {message!r}")
 
