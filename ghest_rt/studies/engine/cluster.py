@@ -1,0 +1,81 @@
+"""Tasks on a Dask cluster, named by its scheduler; the results come back here, so no folder needs to be shared."""
+
+import importlib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from ghest_rt.errors import BadInputError, GhestError
+from ghest_rt.studies.engine.run import Job, Outcome
+from ghest_rt.studies.engine.salt import code_salt
+from ghest_rt.studies.engine.store import ResultStore
+from ghest_rt.studies.engine.task import Result, Task
+
+_CONNECT_S = 10.0
+
+
+@dataclass(frozen=True, slots=True)
+class ClusterExecutor:
+    """A Dask cluster. A worker that dies loses nothing but time: its tasks go to the others.
+
+    Attributes:
+        address: Of the scheduler, such as tcp://node1:8786.
+    """
+
+    address: str
+
+    def run(self, jobs: Sequence[Job], store: ResultStore) -> Iterator[Outcome]:
+        """Yield what became of each job as it ends.
+
+        Raises:
+            BadInputError: No scheduler answers at the address.
+            GhestError: Dask is not installed.
+        """
+        dask = _distributed()
+        try:
+            client = dask.Client(self.address, timeout=_CONNECT_S, set_as_default=False)
+        except (OSError, ValueError) as error:
+            raise BadInputError(f"--scheduler {self.address}: no Dask scheduler answers there: {error}") from error
+        with client:
+            waiting = iter(jobs)
+            under_way: dict[Any, Job] = {}
+            completed = dask.as_completed()
+
+            def submit_next() -> None:
+                job = next(waiting, None)
+                if job is not None:
+                    needs = [store.load(key) for key in job.need_keys]
+                    future = client.submit(run_there, job.task, needs, key=f"ghest-{job.key}", pure=False)
+                    under_way[future] = job
+                    completed.add(future)
+
+            # Never more under way than keeps every thread busy: what tasks need travels with them.
+            for _ in range(2 * max(1, sum(client.nthreads().values()))):
+                submit_next()
+            for future in completed:
+                job = under_way.pop(future)
+                submit_next()
+                yield _keep(job, future, store)
+
+
+def run_there(task: Task, needs: list[Result]) -> tuple[str, Result]:
+    """Run a task on a worker; return the worker's hash of the code, and the result."""
+    return code_salt(task.kind), task.run(needs)
+
+
+def _distributed() -> Any:
+    try:
+        return importlib.import_module("distributed")
+    except ImportError as error:
+        raise GhestError("a cluster needs Dask: pip install 'ghest-rt[cluster]'") from error
+
+
+def _keep(job: Job, future: Any, store: ResultStore) -> Outcome:
+    if future.status != "finished":
+        error = future.exception()
+        return Outcome(job, f"{job.task}: {type(error).__name__}: {error}")
+    salt, result = future.result()
+    if salt != code_salt(job.task.kind):
+        return Outcome(job, "a worker of the cluster has other code or other versions of libraries than this machine")
+    store.save(job.key, result)
+    return Outcome(job)

@@ -1,0 +1,58 @@
+"""A hash of the code that results depend on: after a change of it, what is cached no longer counts."""
+
+import hashlib
+import importlib.util
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+import ghest_rt
+from ghest_rt.config.shipped import shipped_config_dir
+
+# Rooms and files of the application that change what a simulated session or an estimate comes out as.
+_CODE = (
+    "config",
+    "estimation",
+    "geometry",
+    "kinematics",
+    "messages",
+    "simulation",
+    "studies/metrics.py",
+    "studies/session",
+    "studies/truth.py",
+    "sync",
+    "vision",
+)
+_LIBRARIES = ("numpy", "mujoco", "opencv-python-headless", "mink", "scipy")
+
+
+@cache
+def code_salt(kind: str) -> str:
+    """Return the hash of the code behind tasks of a kind, of the shipped station files, and of the libraries' versions."""
+    digest = hashlib.sha256(_common().encode())
+    spec = importlib.util.find_spec(kind.partition(":")[0])
+    if spec is not None and spec.origin is not None:
+        digest.update(Path(spec.origin).read_bytes())
+    return digest.hexdigest()
+
+
+@cache
+def _common() -> str:
+    digest = hashlib.sha256()
+    for package in _LIBRARIES:
+        digest.update(f"{package} {_version(package)}\0".encode())
+    root = Path(ghest_rt.__file__).parent
+    for name in _CODE:
+        path = root / name
+        for file in sorted(path.rglob("*.py")) if path.is_dir() else [path]:
+            digest.update(file.relative_to(root).as_posix().encode() + b"\0" + file.read_bytes())
+    for file in sorted(shipped_config_dir().iterdir()):
+        digest.update(file.name.encode() + b"\0" + file.read_bytes())
+    return digest.hexdigest()
+
+
+def _version(package: str) -> str:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return "none"

@@ -1,0 +1,65 @@
+"""Results on disk, one file per task, so that an interrupted study goes on where it was."""
+
+import json
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ghest_rt.errors import GhestError
+from ghest_rt.studies.engine.task import Result
+
+
+@dataclass(frozen=True, slots=True)
+class ResultStore:
+    """A folder of results named by their tasks' keys: `<key>.json`, with `<key>.npz` beside it where there are arrays.
+
+    A result is there once its JSON file is: files appear whole or not at all, whatever happens to the process that writes.
+
+    Attributes:
+        folder: Where they are.
+    """
+
+    folder: Path
+
+    def has(self, key: str) -> bool:
+        """Say whether a result is there."""
+        return self._json(key).is_file()
+
+    def save(self, key: str, result: Result) -> None:
+        """Keep a result.
+
+        Raises:
+            GhestError: The folder cannot be written to.
+        """
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+            if result.arrays:
+                part = self.folder / f".{key}.{os.getpid()}.npz"
+                np.savez(part, **result.arrays)  # type: ignore[arg-type]
+                part.replace(self._npz(key))
+            part = self.folder / f".{key}.{os.getpid()}.json"
+            part.write_text(json.dumps(result.values), encoding="utf-8")
+            part.replace(self._json(key))
+        except OSError as error:
+            raise GhestError(f"{self.folder}: results cannot be kept: {error.strerror or error}") from error
+
+    def values(self, key: str) -> dict[str, object]:
+        """Return a result's scalars and rows."""
+        found: dict[str, object] = json.loads(self._json(key).read_text(encoding="utf-8"))
+        return found
+
+    def load(self, key: str) -> Result:
+        """Return a result with its arrays."""
+        arrays = {}
+        if self._npz(key).is_file():
+            with np.load(self._npz(key), allow_pickle=False) as file:
+                arrays = {name: file[name] for name in file.files}
+        return Result(self.values(key), arrays)
+
+    def _json(self, key: str) -> Path:
+        return self.folder / f"{key}.json"
+
+    def _npz(self, key: str) -> Path:
+        return self.folder / f"{key}.npz"

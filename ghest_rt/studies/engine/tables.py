@@ -1,0 +1,28 @@
+"""Tidy tables of results: one row per finding, as CSV and Parquet."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from ghest_rt.errors import GhestError
+
+
+def write_tables(rows: Sequence[Mapping[str, object]], folder: Path, name: str) -> tuple[Path, Path]:
+    """Write rows with the same columns to `<folder>/<name>.csv` and `.parquet`; return both paths.
+
+    Raises:
+        GhestError: PyArrow is not installed, or the folder cannot be written to.
+    """
+    try:
+        import pyarrow as pa  # noqa: PLC0415 - an extra, imported only when used
+        from pyarrow import csv, parquet  # noqa: PLC0415
+    except ImportError as error:
+        raise GhestError("tables of results need PyArrow: pip install 'ghest-rt[study]'") from error
+    table = pa.Table.from_pylist([dict(row) for row in rows])
+    paths = folder / f"{name}.csv", folder / f"{name}.parquet"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        csv.write_csv(table, paths[0])
+        parquet.write_table(table, paths[1])
+    except OSError as error:
+        raise GhestError(f"{folder}: cannot be written to: {error.strerror or error}") from error
+    return paths
