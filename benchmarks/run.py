@@ -9,14 +9,16 @@ from typing import Any
 
 from rich.console import Console
 
-from benchmarks import bound, encoder_path, footprint, loop, pose, recording, throughput, tick
+from benchmarks import bound, encoder_path, filter_tick, footprint, imaging, loop, pose, recording, throughput, tick
 from benchmarks.plot import draw
 
 _OUT = Path(__file__).resolve().parents[1] / "out" / "benchmarks"
 _BENCHMARKS: dict[str, Callable[[bool], dict[str, Any]]] = {
     "pose": pose.run,
     "bound": bound.run,
+    "imaging": imaging.run,
     "tick": tick.run,
+    "filter": filter_tick.run,
     "throughput": throughput.run,
     "loop": loop.run,
     "memory": loop.memory,

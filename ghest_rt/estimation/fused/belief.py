@@ -1,6 +1,5 @@
 """What the filter believes at one instant: a point on the manifold and the covariance of the error around it."""
 
-from copy import copy
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -22,7 +21,7 @@ ARM_RATE = slice(21, 24)
 RATES = slice(15, 24)
 SIZE = 24
 
-_EYE_3 = np.eye(3)
+_THREE_HALVES = 1.5 * np.eye(3)
 
 
 @dataclass(slots=True, eq=False)
@@ -97,7 +96,21 @@ class Belief:
 
     def copy(self) -> "Belief":
         """Return a copy that may be moved on without touching this one."""
-        return copy(self)
+        return Belief(
+            self.t_ns,
+            self.e_from_r1,
+            self.e_from_marker,
+            self.p_gh,
+            self.rates,
+            self.gh_in_marker,
+            self.P,
+            self.agility,
+            self.seen_ns,
+            self.speed_rad_s,
+            self.surprise,
+            self.streaks,
+            self.base,
+        )
 
     def e_from(self, marker: int) -> Array:
         """Return the (4, 4) pose of m0 (0) or m1 (1) in E, equation (7)."""
@@ -107,14 +120,14 @@ class Belief:
     def shift(self, error: Array) -> None:
         """Move the point by a (24,) error state."""
         m0, m1 = self.e_from_marker
-        self.e_from_marker = (turned(error[ACROMION], m0), turned(error[ARM], m1))
+        self.e_from_marker = (exp_so3(error[ACROMION]) @ m0, exp_so3(error[ARM]) @ m1)
         self.p_gh = self.p_gh + error[GH]
         self.rates = self.rates + error[RATES]
         in_m0, in_m1 = self.gh_in_marker
         self.gh_in_marker = (in_m0 + error[GH_IN_MARKER[0]], in_m1 + error[GH_IN_MARKER[1]])
 
-
-def turned(rotvec_rad: Array, R: Array) -> Array:
-    """Return exp(rotvec) R, drawn back onto the rotations (first order: rounding never accumulates)."""
-    moved = exp_so3(rotvec_rad) @ R
-    return np.asarray(moved @ (1.5 * _EYE_3 - 0.5 * (moved.T @ moved)))
+    def straighten(self, marker: int) -> None:
+        """Draw a marker's orientation back onto the rotations (first order): rounding never accumulates."""
+        R = self.e_from_marker[marker]
+        straight = R @ (_THREE_HALVES - 0.5 * (R.T @ R))
+        self.e_from_marker = (straight, self.e_from_marker[1]) if marker == 0 else (self.e_from_marker[0], straight)

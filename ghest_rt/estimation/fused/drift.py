@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ghest_rt.estimation.fused.belief import ACROMION, ARM, BOTH_GH, GH, POSES, Belief, turned
+from ghest_rt.estimation.fused.belief import ACROMION, ARM, BOTH_GH, GH, POSES, Base, Belief
 from ghest_rt.estimation.fused.tuning import Tuning
-from ghest_rt.geometry.so3 import Array, exp_so3, skew
+from ghest_rt.geometry.so3 import Array, exp_so3, log_so3, skew
 
 # The drift of both markers and the arm length, in this order.
 SLIDE = (slice(0, 3), slice(6, 9))
@@ -36,7 +36,7 @@ class Posture:
         covariance: (22, 22) of the errors of scapula (rad, left, E axes), GH centre (m, E axes), humerus (rad, left, E axes),
             and drift: slide (m, nominal marker axes) and turn (rad, marker axes) of m0, of m1, arm length (m).
         slide: (3,) of m0 and m1, in the axes of the marker as calibrated, m.
-        turn: (3, 3) of m0 and m1: calibrated_from_actual.
+        turn: (3,) of m0 and m1: rotation vector of calibrated_from_actual, rad.
         drifted: Probability that m0, and that m1, is not where calibration says.
     """
 
@@ -171,14 +171,18 @@ class DriftJudge:
         drift = mean[_POSTURE:]
         m0, m1 = (R @ base.turn.T for R, base in zip(belief.e_from_marker, belief.base, strict=True))
         e_from_gh, e_from_elw = np.eye(4), np.eye(4)
-        e_from_gh[:3, :3] = turned(mean[ACROMION], m0 @ self._m0_from_gh[:3, :3])
+        e_from_gh[:3, :3] = exp_so3(mean[ACROMION]) @ m0 @ self._m0_from_gh[:3, :3]
         e_from_gh[:3, 3] = belief.p_gh + mean[GH]
-        e_from_elw[:3, :3] = turned(mean[ARM], m1 @ self._m1_from_elw[:3, :3])
+        e_from_elw[:3, :3] = exp_so3(mean[ARM]) @ m1 @ self._m1_from_elw[:3, :3]
         e_from_elw[:3, 3] = e_from_gh[:3, 3] - (explained.length_m + float(drift[LENGTH])) * e_from_elw[:3, 1]
         slides = [base.slide + drift[SLIDE[k]] for k, base in enumerate(belief.base)]
-        turns = [base.turn @ exp_so3(drift[TURN[k]]) for k, base in enumerate(belief.base)]
+        turns = [_turned(base, drift[TURN[k]]) for k, base in enumerate(belief.base)]
         jumped = [1.0 if base.jumped else p for base, p in zip(belief.base, drifted, strict=True)]
         return Posture(e_from_gh, e_from_elw, covariance, (slides[0], slides[1]), (turns[0], turns[1]), (jumped[0], jumped[1]))
+
+
+def _turned(base: Base, turn: Array) -> Array:
+    return log_so3(base.turn @ exp_so3(turn)) if base.jumped else turn
 
 
 @dataclass(frozen=True, slots=True, eq=False)

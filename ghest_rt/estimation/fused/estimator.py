@@ -20,7 +20,7 @@ from ghest_rt.estimation.inputs import NO_FRAMES, NOT_SEEN, Inputs
 from ghest_rt.estimation.reasons import gravest
 from ghest_rt.estimation.uncertainty import covariance_in_e, euler_sigma_rad
 from ghest_rt.geometry.se3 import inverse
-from ghest_rt.geometry.so3 import Array, log_so3
+from ghest_rt.geometry.so3 import Array
 from ghest_rt.messages.results import DriftReport, GhEstimate, MarkerDrift, MarkerObservation, MarkerStatus, Reason, Status
 from ghest_rt.sync.encoder_track import EncoderTrack
 
@@ -68,6 +68,7 @@ class FusedEstimator:
         self._patience_ns = [8 * period_ns[camera] // 5 for camera in CAMERAS]
         self._latency_ns: list[float] = [0.0, 0.0]
         self._last: list[Sighting | None] = [None, None]
+        self._gh_from_m0 = inverse(chain.m0_from_gh)
         self._timeline: Timeline | None = None
         self._default = np.diag(np.repeat((self._tuning.default_rotation_rad**2, self._tuning.default_position_m**2), 3))
         self._floor = np.diag(np.repeat((self._tuning.rotation_floor_rad**2, self._tuning.position_floor_m**2), 3))
@@ -115,7 +116,7 @@ class FusedEstimator:
         if e_from_arm is None or (stale and self._given_up(belief, t_ns, covariance)):
             return lost(t_ns, self._why_unseen(stale, t_ns) if stale else Reason.UNCERTAIN, newest_ns)
         m0_from_gh = self._chain.m0_from_gh
-        m0_from_arm = eq10_m0_from_arm(posture.e_from_gh @ inverse(m0_from_gh), e_from_arm)
+        m0_from_arm = eq10_m0_from_arm(posture.e_from_gh @ self._gh_from_m0, e_from_arm)
         gh_from_arm = gh_from_arm_rotation(m0_from_gh, m0_from_arm)
         drift = _report(posture)
         elbow = self._chain.elbow_angles(e_from_arm, joints.positions, posture.covariance[ARM, ARM])
@@ -214,7 +215,7 @@ def _report(posture: Posture) -> DriftReport:
             probability=posture.drifted[k],
             slide_m=posture.slide[k],
             slide_sigma_m=sigma[SLIDE[k]],
-            turn_rad=log_so3(posture.turn[k]),
+            turn_rad=posture.turn[k],
             turn_sigma_rad=sigma[TURN[k]],
         )
         for k in (0, 1)

@@ -24,6 +24,7 @@ from ghest_rt.estimation.fused.belief import (
 from ghest_rt.estimation.fused.measurement import Innovation, innovation_of
 from ghest_rt.estimation.fused.process import Process
 from ghest_rt.estimation.fused.sighting import Sighting
+from ghest_rt.estimation.fused.small import inverse_3, whitened_3
 from ghest_rt.estimation.fused.tuning import Tuning
 from ghest_rt.geometry.so3 import Array
 
@@ -39,8 +40,6 @@ _UNKNOWN_RAD, _UNKNOWN_M, _UNKNOWN_RAD_S, _UNKNOWN_M_S = 0.5, 0.2, 1.0, 0.3
 
 _POSITION = np.arange(3, 6)
 _PLACES = np.r_[GH, GH_RATE, BOTH_GH]
-
-_EYE = np.eye(SIZE)
 
 _Item = TypeVar("_Item")
 
@@ -115,6 +114,7 @@ class FusedFilter:
             freed = self._freed(belief.P, which, everything=outcome is Outcome.JUMP)
             update = _Update(freed, innovation, sighting.covariance)
         update.apply(belief)
+        belief.straighten(which)
         if outcome is Outcome.TAKEN:
             self._adapt(belief, which, foretold.turn_surprise())
         belief.streaks = _with(belief.streaks, which, Streak())
@@ -179,7 +179,7 @@ class _Update:
         H = innovation.H
         noise = R.copy()
         noise[_POSITION, _POSITION] += innovation.bend_m2
-        self._P, self._H, self._H_P, self._noise = P, H, H @ P, noise
+        self._P, self._H_P = P, H @ P
         self._residual = innovation.residual
         self._without_rotation = innovation.without_rotation
         self.spread = self._H_P @ H.T + noise
@@ -188,15 +188,15 @@ class _Update:
 
     def turn_surprise(self) -> Array:
         """Return the (3,) innovation of the rotation, whitened."""
-        return np.linalg.solve(np.linalg.cholesky(self.spread[:3, :3]), self._residual[:3])
+        return whitened_3(self.spread[:3, :3], self._residual[:3])
 
     def apply(self, belief: Belief) -> None:
         """Correct a belief."""
         T, H_P = self._without_rotation, self._H_P
         gain = (self._information @ H_P).T
-        gain[_PLACES] = ((T.T @ np.linalg.inv(T @ self.spread @ T.T)) @ (T @ H_P)).T[_PLACES]
-        kept = _EYE - gain @ self._H
-        P = kept @ self._P @ kept.T + gain @ self._noise @ gain.T
+        gain[_PLACES] = ((T.T @ inverse_3(T @ self.spread @ T.T)) @ (T @ H_P)).T[_PLACES]
+        # Joseph's (1 - K H) P (1 - K H)^T + K R K^T, multiplied out, and its symmetric part.
+        P = self._P + gain @ (self.spread @ gain.T - 2.0 * H_P)
         belief.P = 0.5 * (P + P.T)
         belief.shift(gain @ self._residual)
 

@@ -45,11 +45,15 @@ class JointForecast:
         self._encoders = encoders
         self._max_gap_ns = max_gap_ns
         self._last: deque[EncoderSample] = deque(maxlen=3)
+        # Per ns and per ns^2: divided differences of the last samples; None where they are too far apart.
+        self._slope: Array | None = None
+        self._bend: Array | None = None
 
     def add(self, sample: EncoderSample) -> None:
         """Note a sample that the track has taken."""
         if not self._last or sample.t_capture_ns - self._last[-1].t_capture_ns >= _LEAST_STEP_NS:
             self._last.append(sample)
+            self._slope, self._bend = self._differences()
 
     def at(self, t_ns: int) -> Joints | None:
         """Return the joints at `t_ns`; None if the encoders say nothing about it."""
@@ -67,18 +71,24 @@ class JointForecast:
     def _forecast(self, ahead_ns: int) -> Array:
         """Newton's interpolation polynomial through the last samples, carried on."""
         last = self._last[-1]
-        if len(self._last) < 2 or not _regular(self._last[-2], last):
+        if self._slope is None:
             return last.angles_rad
-        second = self._last[-2]
+        straight = last.angles_rad + ahead_ns * self._slope
+        if self._bend is None:
+            return straight
+        curved_ns = min(ahead_ns, _CURVED_NS)
+        return straight + curved_ns * (curved_ns + last.t_capture_ns - self._last[-2].t_capture_ns) * self._bend
+
+    def _differences(self) -> tuple[Array | None, Array | None]:
+        if len(self._last) < 2 or not _regular(self._last[-2], self._last[-1]):
+            return None, None
+        second, last = self._last[-2], self._last[-1]
         slope = (last.angles_rad - second.angles_rad) / (last.t_capture_ns - second.t_capture_ns)
         if len(self._last) < 3 or not _regular(self._last[-3], second):
-            return last.angles_rad + ahead_ns * slope
+            return slope, None
         third = self._last[-3]
         before = (second.angles_rad - third.angles_rad) / (second.t_capture_ns - third.t_capture_ns)
-        curvature = (slope - before) / (last.t_capture_ns - third.t_capture_ns)
-        curved_ns = min(ahead_ns, _CURVED_NS)
-        bend = curved_ns * (curved_ns + last.t_capture_ns - second.t_capture_ns)
-        return last.angles_rad + ahead_ns * slope + bend * curvature
+        return slope, (slope - before) / (last.t_capture_ns - third.t_capture_ns)
 
 
 def _regular(earlier: EncoderSample, later: EncoderSample) -> bool:

@@ -46,7 +46,7 @@ def innovation_of(belief: Belief, marker: int, e_from_marker: Array) -> Innovati
     residual = np.empty(6)
     residual[:3] = log_so3(e_from_marker[:3, :3] @ R.T)
     residual[3:] = e_from_marker[:3, 3] - belief.p_gh + lever
-    variance = belief.P.diagonal()
-    bend = float(variance[_ROTATION[marker]].sum() * variance[GH_IN_MARKER[marker]].sum()) / 3.0
+    variance = belief.P.diagonal().tolist()
+    bend = sum(variance[_ROTATION[marker]]) * sum(variance[GH_IN_MARKER[marker]]) / 3.0
     without_rotation = np.concatenate((-H[3:, _ROTATION[marker]], _EYE_3), axis=1)
     return Innovation(residual, H, bend, without_rotation)
