@@ -1,0 +1,54 @@
+"""An identity: a folder with certificate, private key and the clinic's CA. `identity_check` reads and checks one."""
+
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+from pathlib import Path
+
+from ghest_rt.security.access import AccessList
+from ghest_rt.security.roles import Role
+
+CA_FILE = "ca.pem"
+CERTIFICATE_FILE = "certificate.pem"
+KEY_FILE = "key.pem"
+
+EXPIRES_SOON = timedelta(days=30)
+
+
+@dataclass(frozen=True, slots=True)
+class Identity:
+    """A checked identity.
+
+    Attributes:
+        folder: Where it stands.
+        role: What it may do.
+        name: Of the machine or function.
+        hosts: Names and addresses that others may connect to it by.
+        expires: End of its validity.
+        access: Who may do what here; None for those whom nobody connects to.
+    """
+
+    folder: Path
+    role: Role
+    name: str
+    hosts: tuple[str, ...]
+    expires: datetime
+    access: AccessList | None
+
+    @property
+    def ca(self) -> Path:
+        """The authority's certificate."""
+        return self.folder / CA_FILE
+
+    @property
+    def certificate(self) -> Path:
+        """The certificate."""
+        return self.folder / CERTIFICATE_FILE
+
+    @property
+    def key(self) -> Path:
+        """The private key."""
+        return self.folder / KEY_FILE
+
+    def expires_soon(self, now: datetime) -> bool:
+        """Whether it is time to renew it."""
+        return self.expires - now < EXPIRES_SOON
