@@ -20,6 +20,7 @@ from ghest_rt.security.roles import SERVER_ROLES
 Mode = Literal["peer", "client", "router"]
 
 _SOURCE_PLACE = re.compile(r" at \S+?\.rs:\d+\.?")
+_RETRY = {"period_init_ms": 100, "period_max_ms": 500, "period_increase_factor": 2}  # of lost connections; Zenoh's own: 1-4 s
 _MAX_MESSAGE_BYTES = 1_000_000  # Zenoh's default lets a peer make us collect 1 GB
 _MAX_SESSIONS = 64
 _MAX_PENDING = 16
@@ -35,7 +36,8 @@ def open_session(
         listen: Endpoints to listen on, like "tcp/127.0.0.1:7447".
         connect: Endpoints to connect to; peers that are not there yet are tried again by Zenoh.
         identity: Who we are; needed beyond this machine, with endpoints like "tls/bed-1.clinic.lan:7447".
-        mode: What Zenoh calls the kind of node.
+        mode: What Zenoh calls the kind of node. A client has one connection, and is refused when nobody answers; a router passes
+            messages on between clients and peers, but not from one peer to another.
 
     Raises:
         BadInputError: An endpoint is malformed or leaves this machine without an identity; the identity is none to listen with.
@@ -72,6 +74,7 @@ def session_settings(
         "mode": mode,
         "listen/endpoints": list(listen),
         "connect/endpoints": list(connect),
+        "connect/retry": _RETRY,
         "scouting/multicast/enabled": False,
         "scouting/gossip/enabled": False,
         "transport/link/rx/max_message_size": _MAX_MESSAGE_BYTES,
