@@ -183,6 +183,7 @@ def simulate(
     ] = SoftTissue.NONE,
     fault: Faults = None,
     image: ImageFaults = None,
+    color_only: Annotated[bool, typer.Option("--color-only", metavar="", help="Cameras without depth")] = False,
     as_json: _Json = False,
 ) -> None:
     """Record a simulated patient in the exoskeleton, with the true angles (needs the extra 'sim')."""
@@ -212,6 +213,7 @@ def simulate(
             soft_tissue=soft_tissue.value,
             faults=tuple(map(parse_fault, fault or ())),
             imaging=parse_imaging(image or ()),
+            color_only=color_only,
         ),
         as_json,
     )

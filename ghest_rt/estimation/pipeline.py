@@ -1,6 +1,7 @@
 """One station's whole path from frames and encoder samples to GH estimates, for the live service and off-line runs alike."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Literal
 
 from ghest_drivers.samples import CameraInfo, EncoderSample, RgbdFrame
@@ -9,7 +10,7 @@ from ghest_rt.config.station import StationConfig
 from ghest_rt.errors import BadInputError
 from ghest_rt.estimation.arm_chain import CAMERAS
 from ghest_rt.estimation.factory import make_estimator
-from ghest_rt.messages.results import GhEstimate, MarkerObservation
+from ghest_rt.messages.results import GhEstimate, MarkerObservation, MarkerStatus
 from ghest_rt.vision.detector import MarkerDetector
 from ghest_rt.vision.factory import make_detector
 
@@ -34,7 +35,7 @@ class Pipeline:
     Attributes:
         method: How markers are found and angles estimated ("aruco": OpenCV's markers and the refined estimator;
             "photometric": photometric detectors and the refined estimator;
-            "fused": the refined detectors and the filter).
+            "fused": photometric detectors and the filter).
         rate_hz: How often estimates are wanted.
         lag_ns: How long after an instant its estimate is asked for.
     """
@@ -58,7 +59,8 @@ class Pipeline:
             detectors: Takes the place of the method's own detectors.
 
         Raises:
-            BadInputError: A camera is missing, or the station does not fit the URDF or the encoder link.
+            BadInputError: A camera is missing, the method cannot do without depth, or the station does not fit the URDF or the
+                encoder link.
         """
         config = station.config
         missing = [camera for camera in CAMERAS if camera not in camera_infos]
@@ -67,16 +69,18 @@ class Pipeline:
         self.method: Method = method or config.estimator.method
         self.rate_hz = config.rate_hz
         self.lag_ns = lag_ns_of(config, self.method)
+        self._without_depth = frozenset(camera for camera in CAMERAS if not config.cameras[camera].depth)
         self._detectors = (
             dict(detectors)
             if detectors is not None
             else {
                 camera: make_detector(
-                    "refined" if self.method == "fused" else self.method,
+                    "photometric" if self.method == "fused" else self.method,
                     camera,
                     config.cameras[camera].marker,
                     config.markers[config.cameras[camera].marker],
                     camera_infos[camera],
+                    color_only=camera in self._without_depth,
                 )
                 for camera in CAMERAS
             }
@@ -96,8 +100,14 @@ class Pipeline:
         return CAMERAS
 
     def observe(self, frame: RgbdFrame) -> MarkerObservation:
-        """Find the camera's marker in a frame, steps 3.3.1; frames of one camera in their order."""
-        return self._detectors[frame.info.name].detect(frame)
+        """Find the camera's marker in a frame, steps 3.3.1; frames of one camera in their order.
+
+        A pose from colour alone is no worse than normal where the station file leaves depth out.
+        """
+        seen = self._detectors[frame.info.name].detect(frame)
+        if seen.status is MarkerStatus.COLOR_ONLY and seen.camera in self._without_depth:
+            return replace(seen, status=MarkerStatus.OK)
+        return seen
 
     def add(self, sample: MarkerObservation | EncoderSample) -> None:
         """Take what `observe` returned, or an encoder sample, in the order of arrival."""

@@ -30,7 +30,7 @@ _COMPRESSION = {"zstd": CompressionType.ZSTD, "none": CompressionType.NONE}
 class _CameraChannels:
     info: CameraInfo
     color: int
-    depth: int
+    depth: int | None
     device_time: int
 
 
@@ -84,8 +84,13 @@ class RecordingWriter:
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None) -> None:
         self.close()
 
-    def add_camera(self, info: CameraInfo, t_ns: int) -> None:
+    def add_camera(self, info: CameraInfo, t_ns: int, *, with_depth: bool = True) -> None:
         """Write a camera's facts and calibrations, before its first frame.
+
+        Args:
+            info: The camera.
+            t_ns: When.
+            with_depth: Whether it delivers depth images.
 
         Raises:
             ValueError: The camera has been added before.
@@ -95,16 +100,16 @@ class RecordingWriter:
         channels = _CameraChannels(
             info,
             color=self._image_channel(layout.color_topic(info.name)),
-            depth=self._image_channel(layout.depth_topic(info.name)),
+            depth=self._image_channel(layout.depth_topic(info.name)) if with_depth else None,
             device_time=self._json_channel(layout.device_time_topic(info.name), layout.DEVICE_TIME_SCHEMA, rows.DeviceTimeRow),
         )
         self._cameras[info.name] = channels
         facts = self._json_channel(layout.camera_topic(info.name), layout.CAMERA_SCHEMA, rows.CameraRow)
         self._put(facts, 0, t_ns, t_ns, rows.camera_to_json(info))
-        for topic, intrinsics, frame_id in (
-            (layout.color_calibration_topic(info.name), info.color, info.name),
-            (layout.depth_calibration_topic(info.name), info.depth, f"{info.name}_depth"),
-        ):
+        calibrations = [(layout.color_calibration_topic(info.name), info.color, info.name)]
+        if with_depth:
+            calibrations.append((layout.depth_calibration_topic(info.name), info.depth, f"{info.name}_depth"))
+        for topic, intrinsics, frame_id in calibrations:
             schema = self._schema(layout.CALIBRATION_SCHEMA, "protobuf", layout.calibration_schema_data)
             channel = self._channel(topic, "protobuf", schema)
             self._put(channel, 0, t_ns, t_ns, _calibration(intrinsics, frame_id, t_ns))
@@ -113,7 +118,7 @@ class RecordingWriter:
         """Write a frame: its device time where that is not the capture time, depth image, colour image.
 
         Raises:
-            ValueError: The camera was not added, or an image does not have its calibration's size.
+            ValueError: The camera was not added, or not with depth, or an image does not have its calibration's size.
         """
         camera = self._cameras.get(frame.info.name)
         if camera is None:
@@ -124,6 +129,8 @@ class RecordingWriter:
             data = rows.device_time_to_json(frame.seq, frame.t_device_ns)
             self._put(camera.device_time, frame.seq, frame.t_arrival_ns, frame.t_capture_ns, data)
         if frame.depth_counts is not None:
+            if camera.depth is None:
+                raise ValueError(f"depth image of camera {frame.info.name}, which was added without depth")
             _check("depth", frame.depth_counts, (depth.height_px, depth.width_px), np.uint16)
             counts = frame.depth_counts.astype("<u2", copy=False)
             data = _image(counts, "16UC1", f"{camera.info.name}_depth", frame.t_depth_capture_ns)

@@ -17,7 +17,7 @@ from ghest_rt.recording.writer import RecordingWriter
 from ghest_rt.simulation.anatomy import anatomy
 from ghest_rt.simulation.disturbances import MarkerMove, SoftTissueName
 from ghest_rt.simulation.faults import DeviceFault, FaultyDevices
-from ghest_rt.simulation.fitting import fit_station
+from ghest_rt.simulation.fitting import fit_station, without_depth
 from ghest_rt.simulation.imaging import Light
 from ghest_rt.simulation.opensim_file import read_motion_table
 from ghest_rt.simulation.opensim_motion import OpenSimMotion
@@ -58,6 +58,7 @@ class SimulateOptions:
         marker_moves: Markers that are not where the calibration says.
         soft_tissue: How skin moves the markers.
         faults: What the devices fail to deliver.
+        color_only: Cameras without depth; the recording's station file says so.
         imaging: What goes wrong with the colour images.
     """
 
@@ -76,6 +77,7 @@ class SimulateOptions:
     marker_moves: tuple[MarkerMove, ...] = ()
     soft_tissue: SoftTissueName = "none"
     faults: tuple[DeviceFault, ...] = ()
+    color_only: bool = False
     imaging: Imaging = field(default_factory=Imaging)
 
 
@@ -116,6 +118,8 @@ def build_world(options: SimulateOptions) -> World:
     sensors = find_sensors(options.sensor)
     body = anatomy(options.height_m)
     station = fit_station(_station(options), body)
+    if options.color_only:
+        station = without_depth(station)
     if station.config.station.arm != options.arm:
         raise BadInputError(
             f"{station.source}: station.arm is {station.config.station.arm}, asked for is the {options.arm} arm; "
@@ -163,7 +167,7 @@ def simulate(options: SimulateOptions, progress: Callable[[float], None]) -> Sim
         ThreadPoolExecutor(max_workers=len(world.camera_names)) as pool,
     ):
         for camera in world.camera_names:
-            writer.add_camera(world.camera_info(camera), first_ns)
+            writer.add_camera(world.camera_info(camera), first_ns, with_depth=not options.color_only)
         frames = {camera: _render_ahead(world, devices, camera, given, pool) for camera, given in deliveries.items()}
         names = world.encoder_info().joint_names
         rows = 0
@@ -176,7 +180,8 @@ def simulate(options: SimulateOptions, progress: Callable[[float], None]) -> Sim
                     rows += 1
                     writer.write_encoder(sample, names)
             else:
-                writer.write_frame(next(frames[kind]))
+                frame = next(frames[kind])
+                writer.write_frame(replace(frame, depth_counts=None) if options.color_only else frame)
                 progress(done / len(events))
     progress(1.0)
     return SimulationSummary(
@@ -294,6 +299,8 @@ def _command(options: SimulateOptions) -> str:
         words += ["--height", f"{options.height_m:g}"]
     if options.marker != "disks":
         words += ["--marker", options.marker]
+    if options.color_only:
+        words.append("--color-only")
     for move in options.marker_moves:
         words += [f"--marker-{move.kind}", move.text]
     if options.soft_tissue != "none":
