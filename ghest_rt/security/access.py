@@ -27,7 +27,7 @@ _CALIBRATE = ("ghest/*/calibrate/**",)
 
 
 class AccessList(BaseModel):
-    """The identities of a clinic that are neither revoked nor expired when this was written.
+    """The identities of a clinic that were not revoked when this was written (TLS itself refuses those that have expired).
 
     Attributes:
         format: 1.

@@ -34,13 +34,13 @@ def load_identity(folder: Path, now: datetime | None = None) -> Identity:
     authority = load_certificate(folder / CA_FILE)
     path = folder / CERTIFICATE_FILE
     certificate = load_certificate(path)
-    _check_times(folder / CA_FILE, authority, now, "make a new authority: ghest-rt certs init")
+    check_times(folder / CA_FILE, authority, now, "make a new authority: ghest-rt certs init")
     _check_issuer(path, certificate, authority)
     try:
         role, name = parse_common_name(name_of(certificate))
     except BadInputError as error:
         raise BadInputError(f"{path}: {error}") from error
-    _check_times(path, certificate, now, f"renew it: ghest-rt certs renew {role}.{name}")
+    check_times(path, certificate, now, f"renew it: ghest-rt certs renew {role}.{name}")
     if role in SERVER_ROLES and ExtendedKeyUsageOID.SERVER_AUTH not in _usages(certificate):
         raise BadInputError(f"{path}: the certificate of a {role} must be good for a server; issue it anew")
     _check_key(folder / KEY_FILE, certificate)
@@ -60,7 +60,12 @@ def load_certificate(path: Path) -> x509.Certificate:
         raise BadInputError(f"{path}: not a certificate in PEM form; copy the identity's whole folder again") from error
 
 
-def _check_times(path: Path, certificate: x509.Certificate, now: datetime, remedy: str) -> None:
+def check_times(path: Path, certificate: x509.Certificate, now: datetime, remedy: str) -> None:
+    """Refuse a certificate that does not hold now.
+
+    Raises:
+        BadInputError: It has expired, or is not valid yet.
+    """
     begins, ends = certificate.not_valid_before_utc, certificate.not_valid_after_utc
     if now > ends:
         raise BadInputError(f"{path}: the certificate of {name_of(certificate)} expired on {ends:%Y-%m-%d %H:%M} UTC; {remedy}")
