@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from ghest_rt.cli.certs import app as certs_app
 from ghest_rt.cli.options import Faults, ImageFaults, MarkerTexture, Method, Movement, Sensor, Shifts, Side, SoftTissue, Turns
 from ghest_rt.cli.study.app import app as study_app
 from ghest_rt.errors import GhestError
@@ -24,6 +25,7 @@ app = typer.Typer(
 )
 
 app.add_typer(study_app)
+app.add_typer(certs_app, name="certs")
 
 _MOVEMENTS = "|".join(Movement)
 _Recording = Annotated[Path, typer.Argument(metavar="RECORDING", help="Recording (.mcap)", show_default=False)]
