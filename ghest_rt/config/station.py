@@ -125,6 +125,10 @@ class Publisher(Strict):
     enabled: bool = True
     listen: tuple[str, ...] = ("tcp/127.0.0.1:7447",)
     connect: tuple[str, ...] = ()
+    identity: str | None = Field(
+        default=None,
+        description="Folder made by `ghest-rt certs issue`, relative to the station file; beyond this machine there must be one",
+    )
 
 
 class StationConfig(Strict):
