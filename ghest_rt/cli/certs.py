@@ -58,10 +58,9 @@ def init(
     from ghest_rt.security.authority import Authority  # noqa: PLC0415  (needs the extra `security`)
 
     authority = Authority.create(pki, clinic, days)
-    Console().print(
+    typer.echo(
         f"authority of {authority.clinic} in {pki}, valid until {authority.expires:%Y-%m-%d}\n"
         f"{pki}/ca-key.pem signs whatever it is told to: keep this folder off the stations, with a copy in a safe place",
-        highlight=False,
     )
 
 
@@ -94,7 +93,7 @@ def revoke(name: _Name, pki: _Pki = _DEFAULT_PKI) -> None:
     """Take an identity off the access list for good."""
     authority = _open(pki)
     authority.revoke(name)
-    Console().print(f"{name} is revoked; no station lets it in once it has the new list", highlight=False)
+    typer.echo(f"{name} is revoked; no station lets it in once it has the new list")
     _tell_lists(authority.lists())
 
 
@@ -130,17 +129,13 @@ def check(
     from ghest_rt.security.identity_check import load_identity  # noqa: PLC0415  (needs the extra `security`)
 
     identity = load_identity(folder)
-    console = Console()
-    console.print(
+    typer.echo(
         f"{identity.role}.{identity.name} can be used until {identity.expires:%Y-%m-%d %H:%M} UTC"
         + (f"; listens as {', '.join(identity.hosts)}" if identity.hosts else ""),
-        highlight=False,
     )
     if connect is not None:
         try_handshake(connect, identity)
-        console.print(
-            f"{connect} accepts the certificate; what it may do there is decided by that station's access list", highlight=False
-        )
+        typer.echo(f"{connect} accepts the certificate; what it may do there is decided by that station's access list")
 
 
 def _open(pki: Path) -> "Authority":
@@ -153,20 +148,17 @@ def _tell(authority: "Authority", name: str, folder: Path) -> None:
     entry = next(entry for entry in reversed(authority.issued()) if entry.common_name == name)
     role, _ = parse_common_name(name)
     where = "[publisher] identity" if role is Role.STATION else "the program that connects"
-    Console().print(
+    typer.echo(
         f"{name} until {entry.expires:%Y-%m-%d}: "
         f"carry {folder} to its machine ({where}) and delete it here: it holds the private key",
-        highlight=False,
-        soft_wrap=True,
     )
 
 
 def _tell_lists(lists: list[Path]) -> None:
     if lists:
-        Console().print(
+        typer.echo(
             "stations and routers learn of it from their new access list (copy it, then restart the service): "
             + ", ".join(map(str, lists)),
-            highlight=False,
             soft_wrap=True,
         )
 

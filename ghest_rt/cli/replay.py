@@ -17,6 +17,7 @@ from ghest_rt.cli.publishing import Publishing
 from ghest_rt.cli.report import RunReport, print_reports, report_of
 from ghest_rt.cli.scoreboard import Scoreboard
 from ghest_rt.config.load import LoadedStation, load_station
+from ghest_rt.config.station import Publisher
 from ghest_rt.errors import BadInputError
 from ghest_rt.estimation.offline import estimate_events
 from ghest_rt.estimation.pipeline import Pipeline, lag_ns_of
@@ -91,7 +92,10 @@ def replay_path(options: ReplayOptions) -> None:
     reports: list[RunReport] = []
     with StopSignals() as stop, ExitStack() as stack, service_manager() as manager:
         config = (station or recordings[0].station).config
-        publishing = stack.enter_context(Publishing(config.publisher, options.listen, options.publish, lossless=speed is None))
+        # A recording, which may come from anywhere, does not say where it is published.
+        settings = Publisher() if options.station is None else config.publisher
+        folder = Path() if options.station is None else options.station.parent
+        publishing = stack.enter_context(Publishing(settings, options.listen, options.publish, speed is None, folder))
         player = _Replayer(options, speed, publishing, manager, stop)
         while True:
             reports.extend(

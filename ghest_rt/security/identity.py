@@ -1,11 +1,15 @@
 """An identity: a folder with certificate, private key and the clinic's CA. `identity_check` reads and checks one."""
 
+import logging
 from dataclasses import dataclass
-from datetime import datetime, timedelta
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 from ghest_rt.security.access import AccessList
+from ghest_rt.security.extra import need_security
 from ghest_rt.security.roles import Role
+
+_log = logging.getLogger(__name__)
 
 CA_FILE = "ca.pem"
 CERTIFICATE_FILE = "certificate.pem"
@@ -52,3 +56,20 @@ class Identity:
     def expires_soon(self, now: datetime) -> bool:
         """Whether it is time to renew it."""
         return self.expires - now < EXPIRES_SOON
+
+
+def use_identity(folder: Path) -> Identity:
+    """Return the identity in a folder, checked; logs a warning when it is about to expire.
+
+    Raises:
+        BadInputError: It cannot be used; names the file and the remedy.
+        GhestError: The extra `security` is not installed.
+    """
+    need_security()
+    from ghest_rt.security.identity_check import load_identity  # noqa: PLC0415  (needs the extra `security`)
+
+    identity, now = load_identity(folder), datetime.now(UTC)
+    if identity.expires_soon(now):
+        name = f"{identity.role}.{identity.name}"
+        _log.warning("%s expires on %s: renew it (ghest-rt certs renew %s)", name, f"{identity.expires:%Y-%m-%d}", name)
+    return identity
