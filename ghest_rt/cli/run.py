@@ -83,7 +83,7 @@ def run_station(options: RunOptions) -> None:
     scoreboard = world.scoreboard if world is not None else Scoreboard()
     with (
         StopSignals() as stop,
-        Publishing(config.publisher, options.listen, options.publish, lossless=False) as publishing,
+        Publishing(config.publisher, options.listen, options.publish, False, options.station.parent) as publishing,
         live_recording(options.record, station, clock) as recording,
     ):
         facts = LiveFacts(config.station.id, method, publishing.endpoints, f"ghest/{config.station.id}/gh/angles")
