@@ -1,0 +1,1 @@
+"""A simulated session in memory: from the clinic through the detectors and the estimator to errors, without a recording."""
