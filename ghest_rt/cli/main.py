@@ -281,6 +281,31 @@ def listen(
 
 
 @app.command()
+def status(
+    connect: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="ENDPOINT",
+            help="Where a ghest-rt, or a router, listens; repeatable [default: tcp/127.0.0.1:7447]",
+            show_default=False,
+        ),
+    ] = None,
+    station: Annotated[
+        str, typer.Option("--station", metavar="NAME", help="Only the station with this id; * for all that are found")
+    ] = "*",
+    wait_s: Annotated[
+        float, typer.Option("--wait", min=0.1, metavar="SECONDS", help="How long to wait for what they say")
+    ] = 3.0,
+    watch: Annotated[bool, typer.Option("--watch", "-w", metavar="", help="Go on until stopped")] = False,
+    as_json: _Json = False,
+) -> None:
+    """Say how the running stations are; exit code 3 if there is none."""
+    from ghest_rt.cli.status import show_status
+
+    show_status(tuple(connect or ["tcp/127.0.0.1:7447"]), station, wait_s, watch, as_json)
+
+
+@app.command()
 def schema(
     out: Annotated[
         Path | None, typer.Option(metavar="FOLDER", help="Write one file per message instead of printing", show_default=False)

@@ -26,6 +26,7 @@ from ghest_rt.service.compose import AnglesComposer, Numbering
 from ghest_rt.service.contract import ServiceSettings
 from ghest_rt.service.devices import make_devices, uses_simulation
 from ghest_rt.service.loop import Service
+from ghest_rt.service.metrics import metrics_endpoint
 from ghest_rt.service.notify import service_manager
 from ghest_rt.service.outputs import Output
 from ghest_rt.service.run import run_service
@@ -85,6 +86,7 @@ def run_station(options: RunOptions) -> None:
         StopSignals() as stop,
         Publishing(config.publisher, options.listen, options.publish, False, options.station.parent) as publishing,
         live_recording(options.record, station, clock) as recording,
+        metrics_endpoint(config) as metrics,
     ):
         facts = LiveFacts(config.station.id, method, publishing.endpoints, f"ghest/{config.station.id}/gh/angles")
         publisher = publishing.publisher_for(config)
@@ -92,7 +94,7 @@ def run_station(options: RunOptions) -> None:
         # systemd shows the state itself.
         level = logging.DEBUG if manager.present else logging.INFO
         with LiveView(console, facts, scoreboard, level) as view, manager:
-            outputs: list[Output] = [output for output in (publisher, world) if output is not None]
+            outputs: list[Output] = [output for output in (publisher, world, metrics) if output is not None]
             if recording is not None:
                 cameras, encoders = recording.tap(cameras, encoders)
                 outputs.append(recording.output)

@@ -6,6 +6,7 @@ import numpy as np
 from pydantic import AfterValidator, Field, model_validator
 
 from ghest_rt.config.devices import CameraBackend, EncoderBackend
+from ghest_rt.config.metrics import Metrics
 from ghest_rt.config.strict import Strict
 from ghest_rt.geometry.se3 import rigidity_problem
 from ghest_rt.geometry.so3 import Array
@@ -145,6 +146,7 @@ class StationConfig(Strict):
     elbow: Elbow | None = None
     estimator: Estimator = Estimator()
     publisher: Publisher = Publisher()
+    metrics: Metrics = Metrics()
 
     @model_validator(mode="after")
     def _complete(self) -> "StationConfig":
