@@ -115,24 +115,23 @@ class _Run:
         self._grid: Grid | None = None
         self._k = 0
         self._first_frame_ns: dict[str, int] = {}
-        self._last_frame_ns = 0
+        self._last_frame_ns: dict[str, int] = dict.fromkeys(pipeline.cameras, 0)
         self._last_arrival_ns = 0
-        self._held: list[GhEstimate] = []
+        self._held: deque[GhEstimate] = deque()
 
     def take(self, arrival: _Arrival) -> Iterator[GhEstimate]:
         """Yield what is due before a sample arrives, then hand the sample on."""
         self._last_arrival_ns = arrival.t_arrival_ns
         for estimate in self._due(arrival.t_arrival_ns - self._pipeline.lag_ns):
             self._held.append(estimate)
-            if estimate.t_sample_ns <= self._last_frame_ns or estimate.t_sample_ns - self._held[0].t_sample_ns >= _TAIL_NS:
-                yield from self._release()
+            yield from self._release()
         sample = arrival.sample
         if isinstance(sample, EncoderSample):
             self._pipeline.add(sample)
             return
         observation = sample.result()
         self._pipeline.add(observation)
-        self._last_frame_ns = max(self._last_frame_ns, observation.t_capture_ns)
+        self._last_frame_ns[observation.camera] = max(self._last_frame_ns[observation.camera], observation.t_capture_ns)
         yield from self._release()
         if self._grid is None:
             self._first_frame_ns.setdefault(observation.camera, observation.t_capture_ns)
@@ -144,16 +143,29 @@ class _Run:
     def finish(self) -> Iterator[GhEstimate]:
         """Yield the instants that remain when everything has arrived."""
         unfinished_ns = self._last_arrival_ns - self._pipeline.lag_ns
-        for estimate in self._due(self._last_frame_ns + EXACT_NS + 1):
-            if estimate.status is Status.LOST and estimate.t_sample_ns >= unfinished_ns and estimate.reason in _CAME_TOO_LATE:
+        first_end_ns, end_ns = min(self._last_frame_ns.values()), max(self._last_frame_ns.values())
+        together = end_ns - first_end_ns < _TAIL_NS  # otherwise a camera was lost before the end
+        held = [estimate for estimate in self._held if estimate.t_sample_ns <= end_ns]
+        for estimate in (*held, *self._due(end_ns + EXACT_NS + 1)):
+            ended = estimate.t_sample_ns >= unfinished_ns or (together and estimate.t_sample_ns > first_end_ns)
+            if estimate.status is Status.LOST and ended and estimate.reason in _CAME_TOO_LATE:
                 yield replace(estimate, reason=Reason.END_OF_RECORDING)
             else:
                 yield estimate
 
     def _release(self) -> Iterator[GhEstimate]:
-        """Yield what was held back while it was open whether another frame would come."""
-        yield from self._held
-        self._held.clear()
+        """Yield what was held back while it was open whether another frame would come: as far as that is decided, or all."""
+        if self._held and self._held[-1].t_sample_ns - self._held[0].t_sample_ns >= _TAIL_NS:
+            yield from self._held
+            self._held.clear()
+        while self._held and self._decided(self._held[0]):
+            yield self._held.popleft()
+
+    def _decided(self, estimate: GhEstimate) -> bool:
+        """Say whether an instant is certain to lie before the end, and its reason is not that a camera may have ended."""
+        if estimate.reason in _CAME_TOO_LATE:
+            return estimate.t_sample_ns <= min(self._last_frame_ns.values())
+        return estimate.t_sample_ns <= max(self._last_frame_ns.values())
 
     def _due(self, before_ns: int) -> Iterator[GhEstimate]:
         """Yield the estimates at the grid instants earlier than `before_ns` that have not been yielded yet."""

@@ -17,6 +17,7 @@ from ghest_rt.service.camera_worker import CameraWorker, same_camera
 from ghest_rt.service.clocks import ServiceClock
 from ghest_rt.service.compose import AnglesComposer
 from ghest_rt.service.contract import MakePipeline, PipelineLike, ServiceSettings, ServiceSummary
+from ghest_rt.service.drift_watch import DriftWatch
 from ghest_rt.service.encoder_worker import ENCODERS, EncoderWorker
 from ghest_rt.service.health import HealthMeter, SampleCounts, lateness
 from ghest_rt.service.inputs import Severity
@@ -30,7 +31,7 @@ _log = logging.getLogger(__name__)
 _STOP_TIMEOUT_S = 0.7  # SIGTERM must end the service within a second, even if a device hangs in its close
 _HEALTH_PERIOD_NS = 1_000_000_000
 _ABSENT = ((ENCODERS, Reason.ENCODERS_SILENT), ("r0", Reason.R0_NO_FRAMES), ("r1", Reason.R1_NO_FRAMES))
-_CAME_TOO_LATE = (Reason.R0_NO_FRAMES, Reason.R1_NO_FRAMES, Reason.ENCODERS_SILENT)
+_CAME_TOO_LATE = {Reason.R0_NO_FRAMES: "r0", Reason.R1_NO_FRAMES: "r1", Reason.ENCODERS_SILENT: None}
 _LEVELS = {"info": logging.INFO, "warning": logging.WARNING, "error": logging.ERROR}
 
 
@@ -81,6 +82,7 @@ class Service:
         self._meter = self._new_meter(0)
         self._health_due_ns = 0
         self._told_status: Status | None = None
+        self._drift_watch = DriftWatch()
 
     @property
     def anchor_ns(self) -> int | None:
@@ -255,12 +257,14 @@ class Service:
             estimate = self._waiting(t_sample_ns)
         else:
             estimate = self._pipeline.estimate(t_sample_ns)
-        if no_more_frames and estimate.reason in _CAME_TOO_LATE:
+        if estimate.reason in _CAME_TOO_LATE and (no_more_frames or _CAME_TOO_LATE[estimate.reason] in self._ended):
             estimate = replace(estimate, reason=Reason.END_OF_RECORDING)
         message = self._composer.compose(estimate, self._clock.now_ns())
         for output in self._outputs:
             output.angles(message, estimate)
         self._counts.add(estimate)
+        for marker, kind, text in self._drift_watch.see(t_sample_ns, estimate.drift):
+            self._event(kind, "warning" if kind is EventKind.MARKER_DRIFTED else "info", marker, text)
         if t_tick_ns >= self._health_due_ns:
             self._health_due_ns += _HEALTH_PERIOD_NS * (1 + (t_tick_ns - self._health_due_ns) // _HEALTH_PERIOD_NS)
             self._send_health(self._clock.now_ns())
