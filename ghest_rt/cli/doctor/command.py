@@ -15,6 +15,7 @@ from ghest_rt.cli.console import print_json
 from ghest_rt.cli.doctor.checklist import Item, items_for
 from ghest_rt.cli.doctor.devices import Present, check_present, check_station_devices, check_without_station
 from ghest_rt.cli.doctor.findings import Finding, State, exit_code, missing, ok
+from ghest_rt.cli.doctor.host import check_host, check_ticks
 from ghest_rt.cli.doctor.links import can_interfaces, serial_ports
 from ghest_rt.cli.doctor.live import check_cameras, check_encoders
 from ghest_rt.cli.doctor.machine import EXTRA_OF_BACKEND, check_endpoints, check_extras, check_machine, check_real_time
@@ -61,6 +62,8 @@ def _look(station_path: Path | None, live_s: float | None) -> tuple[list[Finding
     findings += check_machine()
     findings += check_extras({EXTRA_OF_BACKEND[name] for name in backends if name in EXTRA_OF_BACKEND})
     findings += check_real_time()
+    findings += check_host()
+    findings.append(check_ticks())
     publisher = station.config.publisher if station is not None else Publisher()
     findings += check_endpoints(publisher.listen if publisher.enabled else ())
     present = _present()

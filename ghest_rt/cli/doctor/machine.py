@@ -21,6 +21,7 @@ _EXTRAS = {
     "oak": ("depthai",),
     "serial": ("serial",),
     "can": ("can", "cantools", "canopen"),
+    "metrics": ("prometheus_client",),
 }
 EXTRA_OF_BACKEND = {
     "sim": "sim",
@@ -67,14 +68,16 @@ def _version(module: str) -> str:
 def check_real_time() -> Iterator[Finding]:
     """Say whether the service may be punctual."""
     remedy = "run it as the systemd unit does (LimitRTPRIO=20, LimitMEMLOCK=infinity), or see limits.conf(5)"
+    limit = f"rtprio limit {resource.getrlimit(resource.RLIMIT_RTPRIO)[0]}"
     if _may_be_real_time():
-        yield ok("real-time priority", "permitted")
+        yield ok("real-time priority", f"permitted ({limit})")
     else:
-        yield note("real-time priority", "not permitted: samples are published up to some milliseconds later", remedy)
-    if resource.getrlimit(resource.RLIMIT_MEMLOCK)[0] == resource.RLIM_INFINITY:
-        yield ok("locked memory", "permitted")
+        yield note("real-time priority", f"not permitted ({limit}): samples leave up to some milliseconds later", remedy)
+    memlock = resource.getrlimit(resource.RLIMIT_MEMLOCK)[0]
+    if memlock == resource.RLIM_INFINITY:
+        yield ok("locked memory", "permitted, unlimited")
     else:
-        yield note("locked memory", "not permitted", remedy)
+        yield note("locked memory", f"not permitted (memlock limit {memlock // 1024} kB; it must be unlimited)", remedy)
 
 
 def _may_be_real_time() -> bool:
