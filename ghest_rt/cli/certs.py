@@ -159,7 +159,6 @@ def _tell_lists(lists: list[Path]) -> None:
         typer.echo(
             "stations and routers learn of it from their new access list (copy it, then restart the service): "
             + ", ".join(map(str, lists)),
-            soft_wrap=True,
         )
 
 

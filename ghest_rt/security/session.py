@@ -36,8 +36,8 @@ def open_session(
         listen: Endpoints to listen on, like "tcp/127.0.0.1:7447".
         connect: Endpoints to connect to; peers that are not there yet are tried again by Zenoh.
         identity: Who we are; needed beyond this machine, with endpoints like "tls/bed-1.clinic.lan:7447".
-        mode: What Zenoh calls the kind of node. A client has one connection, and is refused when nobody answers; a router passes
-            messages on between clients and peers, but not from one peer to another.
+        mode: What Zenoh calls the kind of node. A client has one connection, and is refused when nobody answers; a router
+            passes messages on between clients and peers, but not from one peer to another.
 
     Raises:
         BadInputError: An endpoint is malformed or leaves this machine without an identity; the identity is none to listen with.
