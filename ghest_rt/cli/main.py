@@ -267,6 +267,10 @@ def picture(
 @app.command()
 def listen(
     connect: Annotated[str, typer.Option(metavar="ENDPOINT", help="Where a ghest-rt publishes")] = "tcp/127.0.0.1:7447",
+    station: Annotated[str, typer.Option(metavar="ID", help="Only this station")] = "*",
+    identity: Annotated[
+        Path | None, typer.Option(metavar="FOLDER", help="Who you are, for endpoints with TLS", show_default=False)
+    ] = None,
     count: Annotated[
         int | None, typer.Option(min=1, metavar="N", help="Stop after so many samples", show_default=False)
     ] = None,
@@ -277,7 +281,7 @@ def listen(
     """Print the angles that a running ghest-rt publishes."""
     from ghest_rt.cli.listen import listen_to
 
-    listen_to(connect, count, as_json)
+    listen_to(connect, station, identity, count, as_json)
 
 
 @app.command()
