@@ -1,60 +1,87 @@
 """`ghest-rt listen`: a small subscriber, to see that samples arrive."""
 
-import queue
 import signal
 import sys
 import threading
+from pathlib import Path
 
-import zenoh
-from pydantic import ValidationError
-
-from ghest_rt.errors import GhestError
+from ghest_rt.client import (
+    ConnectionChanged,
+    EventReport,
+    Gap,
+    GhestClient,
+    LinkCause,
+    LinkChanged,
+    LinkState,
+    Restarted,
+    Sample,
+    Unreadable,
+    Update,
+)
 from ghest_rt.messages.published import GhAngles
 from ghest_rt.messages.results import Reason
-from ghest_rt.service.zenoh_session import open_session
 
 _POLL_S = 0.2
 _HINT_AFTER_S = 3.0
+_CAUSES = {
+    LinkCause.SILENT: "nothing comes, though the connection stands",
+    LinkCause.DELAYED: "what comes was published long ago",
+    LinkCause.SERVICE_GONE: "the service has ended",
+    LinkCause.NO_CONNECTION: "no connection",
+}
 
 
-def listen_to(endpoint: str, count: int | None, as_json: bool) -> None:
-    """Print samples as they arrive, until `count` have come or a signal asks to stop.
+def listen_to(endpoint: str, station: str, identity: Path | None, count: int | None, as_json: bool) -> None:
+    """Print samples as they arrive, until `count` have come or a signal asks to stop; all else goes to standard error.
 
     Raises:
-        BadInputError: The endpoint is malformed.
-        GhestError: Zenoh cannot open a session, or what arrives is not ours.
+        BadInputError: The endpoint, the station or the identity cannot be used.
     """
     stop = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda number, frame: stop.set())
-    arrived: queue.SimpleQueue[tuple[str, bytes]] = queue.SimpleQueue()
-
-    def keep(sample: zenoh.Sample) -> None:
-        arrived.put((str(sample.key_expr), sample.payload.to_bytes()))
-
-    session, _ = open_session(connect=(endpoint,))
-    with session, session.declare_subscriber("ghest/*/gh/angles", keep):
-        received, last_seq, lost, quiet_s = 0, -1, 0, 0.0
+    received, lost, quiet_s = 0, 0, 0.0
+    with GhestClient(endpoint, stations=station, identity=identity) as client, client.updates() as updates:
         while not stop.is_set() and (count is None or received < count):
-            try:
-                key, payload = arrived.get(timeout=_POLL_S)
-            except queue.Empty:
+            update = updates.get(_POLL_S)
+            if isinstance(update, Sample):
+                quiet_s = 0.0
+                received += 1
+                sys.stdout.write((update.message.model_dump_json() if as_json else line_of(update.message)) + "\n")
+                sys.stdout.flush()
+                continue
+            if isinstance(update, Gap):
+                lost += update.count
+            told = None if update is None else note_of(update)
+            if told is not None:
+                sys.stderr.write(told + "\n")
+            if update is None:
                 quiet_s += _POLL_S
                 if _HINT_AFTER_S <= quiet_s < _HINT_AFTER_S + _POLL_S:
                     sys.stderr.write(f"nothing arrives from {endpoint}; is a ghest-rt running there?\n")
-                continue
-            quiet_s = 0.0
-            try:
-                message = GhAngles.model_validate_json(payload)
-            except ValidationError as error:
-                raise GhestError(f"{key}: not a message of this version: {error}") from error
-            received += 1
-            if 0 <= last_seq < message.seq - 1:
-                lost += message.seq - last_seq - 1
-            last_seq = message.seq
-            sys.stdout.write((payload.decode() if as_json else line_of(message)) + "\n")
-            sys.stdout.flush()
     sys.stderr.write(f"{received} samples received, {lost} lost\n")
+
+
+def note_of(update: Update) -> str | None:
+    """Return what is not a sample as one line of text; None if it is of no interest here."""
+    match update:
+        case Gap():
+            return f"{update.station}: {update.count} samples missing, {update.first_seq} to {update.last_seq} ({update.cause})"
+        case Restarted():
+            return f"{update.station}: the service was started anew; sample {update.first_seq} is the first of it here"
+        case LinkChanged(state=LinkState.LIVE):
+            return f"{update.station}: live"
+        case LinkChanged():
+            return f"{update.station}: {update.state}: {_CAUSES[update.cause]}"
+        case ConnectionChanged(connected=True):
+            return f"connected to {update.endpoint}"
+        case ConnectionChanged():
+            return f"not connected to {update.endpoint}: {update.detail}"
+        case Unreadable():
+            return f"{update.station}: {update.detail}"
+        case EventReport():
+            return f"{update.station}: {update.message.severity}: {update.message.source}: {update.message.message}"
+    return None
 
 
 def line_of(message: GhAngles) -> str:

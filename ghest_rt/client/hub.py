@@ -1,0 +1,175 @@
+"""The thread between the connections and the receivers: it alone touches the trackers."""
+
+import logging
+import queue
+import threading
+from collections.abc import Callable, Mapping, Sequence
+from typing import Final
+
+from ghest_rt.client.connection import Arrival, Connection, Kind
+from ghest_rt.client.limits import Limits
+from ghest_rt.client.mailbox import Updates
+from ghest_rt.client.reading import UnreadableError, read_message, read_page
+from ghest_rt.client.station_tracker import StationTracker
+from ghest_rt.client.updates import ConnectionChanged, EventReport, HealthReport, Unreadable, Update
+from ghest_rt.messages.published import Event, GhAngles, Health
+
+_log = logging.getLogger(__name__)
+
+_BACKLOG: Final = 20_000
+_IDLE_S: Final = 0.5
+_END_WITHIN_S: Final = 2.0
+
+
+class Hub:
+    """Takes arrivals and receivers from any thread, and tells every receiver every update in the same order.
+
+    Attributes:
+        trackers: By station; other threads may look up and read.
+    """
+
+    def __init__(self, named: Sequence[str], limits: Limits, fill: bool, now_ns: Callable[[], int]) -> None:
+        """Prepare.
+
+        Args:
+            named: Stations to speak of before anything came from them.
+            limits: What counts as late, stale and lost.
+            fill: Whether to ask for missing samples.
+            now_ns: Monotonic clock.
+        """
+        self.trackers: dict[str, StationTracker] = {}
+        self._limits = limits
+        self._fill = fill
+        self._now_ns = now_ns
+        self._items: queue.Queue[tuple[int, Arrival] | Updates | None] = queue.Queue(_BACKLOG)
+        self._connections: Mapping[str, Connection] = {}
+        self._connected: dict[str, ConnectionChanged] = {}
+        self._told: set[Unreadable] = set()
+        self._receivers: tuple[Updates, ...] = ()
+        self._left: set[Updates] = set()
+        self._thread = threading.Thread(target=self._work, name="ghest-client", daemon=True)
+        for station in named:
+            self._tracker(station)
+
+    def start(self, connections: Mapping[str, Connection]) -> None:
+        """Begin, with the connections through which stations can be asked, by endpoint."""
+        self._connections = connections
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End; receivers read what has come and then the end."""
+        self._items.put(None)
+        self._thread.join(_END_WITHIN_S)
+
+    def deliver(self, arrival: Arrival) -> None:
+        """Take what came. If this program hung, samples are dropped here and asked for later."""
+        try:
+            self._items.put_nowait((self._now_ns(), arrival))
+        except queue.Full:
+            _log.debug("too much waits to be read: %s dropped", arrival.kind)
+
+    def join(self, receiver: Updates) -> None:
+        """Tell a receiver everything from now on, beginning with how things stand."""
+        self._items.put(receiver)
+
+    def leave(self, receiver: Updates) -> None:
+        """Tell a receiver nothing more."""
+        self._left.add(receiver)
+
+    def _work(self) -> None:
+        while True:
+            try:
+                item = self._items.get(timeout=self._pause_s())
+            except queue.Empty:
+                pass
+            else:
+                if item is None:
+                    break
+                if isinstance(item, Updates):
+                    self._welcome(item)
+                else:
+                    self._handle(*item)
+            self._look_at_clock()
+        for receiver in self._receivers:
+            receiver.end()
+
+    def _pause_s(self) -> float:
+        deadlines = (tracker.deadline_ns for tracker in self.trackers.values())
+        due_ns = min((deadline_ns for deadline_ns in deadlines if deadline_ns is not None), default=None)
+        return _IDLE_S if due_ns is None else min(_IDLE_S, max(0.001, (due_ns - self._now_ns()) * 1e-9))
+
+    def _look_at_clock(self) -> None:
+        t_ns = self._now_ns()
+        for tracker in tuple(self.trackers.values()):
+            if tracker.deadline_ns is not None and tracker.deadline_ns <= t_ns:
+                self._tell(tracker.on_time(t_ns))
+            request = tracker.take_request()
+            if request is not None:
+                for connection in self._connections.values():
+                    connection.ask_for(request)
+
+    def _welcome(self, receiver: Updates) -> None:
+        for change in self._connected.values():
+            receiver.put(change)
+        for tracker in self.trackers.values():
+            receiver.put(tracker.link)
+            if tracker.newest is not None:
+                receiver.put(tracker.newest)
+        self._receivers = (*self._receivers, receiver)
+
+    def _tell(self, updates: Sequence[Update]) -> None:
+        if self._left:
+            gone, self._left = self._left, set()
+            self._receivers = tuple(receiver for receiver in self._receivers if receiver not in gone)
+        for update in updates:
+            for receiver in self._receivers:
+                receiver.put(update)
+
+    def _handle(self, t_ns: int, arrival: Arrival) -> None:
+        try:
+            self._tell(self._read(t_ns, arrival))
+        except UnreadableError as error:
+            unreadable = Unreadable(arrival.station, str(error))
+            if unreadable not in self._told:
+                self._told.add(unreadable)
+                self._tell([unreadable])
+
+    def _read(self, t_ns: int, arrival: Arrival) -> list[Update]:
+        match arrival.kind:
+            case Kind.CONNECTED | Kind.DISCONNECTED:
+                return self._on_connection(t_ns, arrival)
+            case Kind.HEALTH:
+                return [HealthReport(arrival.station, read_message(Health, arrival.payload))]
+            case Kind.EVENT:
+                return [EventReport(arrival.station, read_message(Event, arrival.payload))]
+            case Kind.TOKEN | Kind.TOKEN_GONE:
+                return self._on_token(t_ns, arrival)
+            case Kind.FILLED if arrival.request is not None:
+                return self._tracker(arrival.station).on_filled(arrival.request, read_page(arrival.payload), t_ns)
+        message = read_message(GhAngles, arrival.payload)
+        tracker = self._tracker(arrival.station)
+        return (
+            tracker.on_last(message, t_ns) if arrival.kind is Kind.LAST else tracker.on_message(arrival.endpoint, message, t_ns)
+        )
+
+    def _on_token(self, t_ns: int, arrival: Arrival) -> list[Update]:
+        alive = arrival.kind is Kind.TOKEN
+        if alive:
+            self._connections[arrival.endpoint].ask_last(arrival.station)
+        return self._tracker(arrival.station).on_token(arrival.endpoint, alive, t_ns)
+
+    def _on_connection(self, t_ns: int, arrival: Arrival) -> list[Update]:
+        change = ConnectionChanged(arrival.endpoint, arrival.kind is Kind.CONNECTED, arrival.payload.decode())
+        if self._connected.get(arrival.endpoint) == change:
+            return []
+        self._connected[arrival.endpoint] = change
+        updates: list[Update] = [change]
+        for tracker in self.trackers.values():
+            updates += tracker.on_connection(arrival.endpoint, change.connected, t_ns)
+        return updates
+
+    def _tracker(self, station: str) -> StationTracker:
+        if station not in self.trackers:
+            tracker = StationTracker(station, self._limits, self._fill, self._now_ns())
+            self.trackers = {**self.trackers, station: tracker}  # a new one: other threads may be reading
+        return self.trackers[station]
