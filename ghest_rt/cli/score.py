@@ -58,6 +58,7 @@ def _mean(scores: Sequence[RecordingScore]) -> dict[str, float]:
         "position_rmse_m": fmean(score.position_rmse_m for score in scores),
         "m0_rmse_m": fmean(score.m0_rmse_m for score in scores),
         "m1_rmse_m": fmean(score.m1_rmse_m for score in scores),
+        "published_orientation_rmse_deg": fmean(score.published_orientation_rmse_deg for score in scores),
         "valid_fraction": fmean(score.valid_fraction for score in scores),
     }
 
@@ -70,17 +71,17 @@ def _print_table(scores: Sequence[RecordingScore]) -> None:
         pad_edge=False,
     )
     table.add_column("recording", overflow="fold", min_width=10)
-    for column in ("method", "arm\n°", "arm\nmm", "m0\nmm", "m1\nmm", "samples", "valid\n%"):
+    for column in ("method", "arm\n°", "at publ.\n°", "arm\nmm", "m0\nmm", "m1\nmm", "valid\n%"):
         table.add_column(column, justify="right", no_wrap=True)
     for score in scores:
         table.add_row(
             Path(score.recording).name,
             score.method,
             f"{score.orientation_rmse_deg:.4f}",
+            f"{score.published_orientation_rmse_deg:.4f}",
             f"{score.position_rmse_m * 1000:.4f}",
             f"{score.m0_rmse_m * 1000:.4f}",
             f"{score.m1_rmse_m * 1000:.4f}",
-            str(score.samples),
             f"{100 * score.valid_fraction:.2f}",
         )
     if len(scores) > 1:
@@ -90,15 +91,18 @@ def _print_table(scores: Sequence[RecordingScore]) -> None:
             "mean",
             "",
             f"{mean['orientation_rmse_deg']:.4f}",
+            f"{mean['published_orientation_rmse_deg']:.4f}",
             f"{mean['position_rmse_m'] * 1000:.4f}",
             f"{mean['m0_rmse_m'] * 1000:.4f}",
             f"{mean['m1_rmse_m'] * 1000:.4f}",
-            "",
             f"{100 * mean['valid_fraction']:.2f}",
         )
     console = Console()
     console.print(table)
+    console.print("at publ.: against the truth when the sample is published, as long after its own instant as the method lags")
     for score in scores:
+        if score.elbow_flexion_rmse_deg is not None:
+            console.print(f"{Path(score.recording).name}: elbow flexion {score.elbow_flexion_rmse_deg:.2f}°", markup=False)
         for line in score.skipped:
             console.print(f"{Path(score.recording).name}: {line}", style="yellow", markup=False)
         if score.unused:

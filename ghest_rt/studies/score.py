@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from statistics import fmean
 
 from ghest_rt.config.load import LoadedStation
 from ghest_rt.errors import BadInputError
@@ -32,6 +33,9 @@ class RecordingScore:
         valid_fraction: Share of them with status `valid`.
         skipped: What of the recording could not be used.
         unused: Samples that the estimator did not use, by reason.
+        published_orientation_rmse_deg: As `orientation_rmse_deg`, against the truth at the instant when a sample is published
+            (`lag_ns` after its own): what a subscriber who takes it for now is wrong by.
+        elbow_flexion_rmse_deg: RMS error of the elbow's flexion; None where there is none, or no truth of it.
     """
 
     recording: str
@@ -44,17 +48,20 @@ class RecordingScore:
     valid_fraction: float
     skipped: tuple[str, ...]
     unused: dict[str, int]
+    published_orientation_rmse_deg: float
+    elbow_flexion_rmse_deg: float | None
 
 
 @dataclass(frozen=True, slots=True)
 class JudgedRun:
-    """A recording's estimates beside its truth."""
+    """A recording's estimates beside its truth; they are published `lag_ns` after the instants they hold for."""
 
     recording: Recording
     method: str
     estimates: list[GhEstimate]
     truth: TruthTrack
     unused: dict[str, int]
+    lag_ns: int
 
 
 def run_with_truth(
@@ -87,7 +94,7 @@ def run_with_truth(
         estimates.append(estimate)
         if progress is not None and len(estimates) % 20 == 0:
             progress(min(1.0, (estimate.t_sample_ns - estimates[0].t_sample_ns) / max(recording.duration_ns, 1)))
-    return JudgedRun(recording, pipeline.method, estimates, truth, pipeline.counts())
+    return JudgedRun(recording, pipeline.method, estimates, truth, pipeline.counts(), pipeline.lag_ns)
 
 
 def score_recording(
@@ -95,9 +102,14 @@ def score_recording(
 ) -> RecordingScore:
     """Score one recording; arguments and errors as of `run_with_truth`."""
     run = run_with_truth(path, method, station, progress)
-    errors = ErrorAccumulator()
+    errors, published = ErrorAccumulator(), ErrorAccumulator()
+    elbow_rad: list[float] = []
     for estimate in run.estimates:
-        errors.add(estimate, run.truth.at(estimate.t_sample_ns))
+        truth = run.truth.at(estimate.t_sample_ns)
+        errors.add(estimate, truth)
+        published.add(estimate, run.truth.at(estimate.t_sample_ns + run.lag_ns))
+        if estimate.elbow is not None and truth is not None and truth.elbow_rad is not None:
+            elbow_rad.append(estimate.elbow.flexion_rad - truth.elbow_rad[0])
     rms = errors.rms()
     return RecordingScore(
         recording=str(path),
@@ -110,6 +122,8 @@ def score_recording(
         valid_fraction=errors.valid_fraction,
         skipped=tuple(str(problem) for problem in run.recording.problems),
         unused=run.unused,
+        published_orientation_rmse_deg=math.degrees(published.rms().orientation_rad),
+        elbow_flexion_rmse_deg=math.degrees(math.sqrt(fmean(e * e for e in elbow_rad))) if elbow_rad else None,
     )
 
 
