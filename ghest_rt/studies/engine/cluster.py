@@ -58,9 +58,9 @@ class ClusterExecutor:
                 yield _keep(job, future, store)
 
 
-def run_there(task: Task, needs: list[Result]) -> tuple[str, Result]:
-    """Run a task on a worker; return the worker's hash of the code, and the result."""
-    return code_salt(task.kind), task.run(needs)
+def run_there(task: Task, needs: list[Result]) -> tuple[str, Result, float]:
+    """Run a task on a worker; return the worker's hash of the code, the result, and its processor time."""
+    return code_salt(task.kind), *task.run(needs)
 
 
 def _distributed() -> Any:
@@ -74,8 +74,8 @@ def _keep(job: Job, future: Any, store: ResultStore) -> Outcome:
     if future.status != "finished":
         error = future.exception()
         return Outcome(job, f"{job.task}: {type(error).__name__}: {error}")
-    salt, result = future.result()
+    salt, result, cpu_s = future.result()
     if salt != code_salt(job.task.kind):
         return Outcome(job, "a worker of the cluster has other code or other versions of libraries than this machine")
-    store.save(job.key, result)
+    store.save(job.key, result, cpu_s)
     return Outcome(job)

@@ -50,7 +50,7 @@ class LocalExecutor:
 def run_and_keep(job: Job, store: ResultStore) -> Outcome:
     """Run a job whose needs are in the store, and keep its result."""
     try:
-        store.save(job.key, job.task.run([store.load(key) for key in job.need_keys]))
+        store.save(job.key, *job.task.run([store.load(key) for key in job.need_keys]))
     except Exception as error:
         # One task that fails must not end the others.
         return Outcome(job, f"{job.task}: {type(error).__name__}: {error}")

@@ -77,6 +77,14 @@ def run_tasks(
     return [store.values(keys[task]) for task in tasks]
 
 
+def spent_cpu_s(tasks: Sequence[Task], store: ResultStore) -> float:
+    """Return the processor time that finished tasks and what they need took, now or in earlier runs."""
+    keys: dict[Task, str] = {}
+    for task in tasks:
+        _add_keys(task, keys)
+    return sum(store.cpu_s(key) for key in keys.values())
+
+
 def _add_keys(task: Task, keys: dict[Task, str]) -> None:
     if task not in keys:
         for need in task.needs:

@@ -4,6 +4,7 @@ import json
 import os
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -27,8 +28,13 @@ class ResultStore:
         """Say whether a result is there."""
         return self._json(key).is_file()
 
-    def save(self, key: str, result: Result) -> None:
+    def save(self, key: str, result: Result, cpu_s: float) -> None:
         """Keep a result.
+
+        Args:
+            key: Its task's key.
+            result: The result.
+            cpu_s: Processor time it took.
 
         Raises:
             GhestError: The folder cannot be written to.
@@ -40,15 +46,19 @@ class ResultStore:
                 np.savez(part, **result.arrays)  # type: ignore[arg-type]
                 part.replace(self._npz(key))
             part = self.folder / f".{key}.{os.getpid()}.json"
-            part.write_text(json.dumps(result.values), encoding="utf-8")
+            part.write_text(json.dumps({"cpu_s": cpu_s, "values": result.values}), encoding="utf-8")
             part.replace(self._json(key))
         except OSError as error:
             raise GhestError(f"{self.folder}: results cannot be kept: {error.strerror or error}") from error
 
     def values(self, key: str) -> dict[str, object]:
         """Return a result's scalars and rows."""
-        found: dict[str, object] = json.loads(self._json(key).read_text(encoding="utf-8"))
+        found: dict[str, object] = self._read(key)["values"]
         return found
+
+    def cpu_s(self, key: str) -> float:
+        """Return the processor time that a result took."""
+        return float(self._read(key)["cpu_s"])
 
     def load(self, key: str) -> Result:
         """Return a result with its arrays."""
@@ -57,6 +67,10 @@ class ResultStore:
             with np.load(self._npz(key), allow_pickle=False) as file:
                 arrays = {name: file[name] for name in file.files}
         return Result(self.values(key), arrays)
+
+    def _read(self, key: str) -> dict[str, Any]:
+        found: dict[str, Any] = json.loads(self._json(key).read_text(encoding="utf-8"))
+        return found
 
     def _json(self, key: str) -> Path:
         return self.folder / f"{key}.json"

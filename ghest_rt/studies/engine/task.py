@@ -3,6 +3,7 @@
 import hashlib
 import importlib
 import json
+import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -67,13 +68,15 @@ class Task:
         parts = (self.kind, self.parameters_json, salt(self.kind), *(need.key(salt) for need in self.needs))
         return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:32]
 
-    def run(self, needs: Sequence[Result]) -> Result:
-        """Carry the task out.
+    def run(self, needs: Sequence[Result]) -> tuple[Result, float]:
+        """Carry the task out; return its result and the processor time it took, seconds.
 
         Args:
             needs: The results of the tasks needed, in their order.
         """
-        return find_handler(self.kind)(self.parameters, needs)
+        start_s = time.process_time()
+        result = find_handler(self.kind)(self.parameters, needs)
+        return result, time.process_time() - start_s
 
 
 def find_handler(kind: str) -> Handler:

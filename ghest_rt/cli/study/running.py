@@ -1,0 +1,55 @@
+"""What every study does on the command line: check the installation, choose where to run, show progress."""
+
+import importlib.util
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+from ghest_rt.errors import GhestError
+from ghest_rt.studies.engine.cluster import ClusterExecutor
+from ghest_rt.studies.engine.local import LocalExecutor
+from ghest_rt.studies.engine.run import Executor
+from ghest_rt.studies.engine.store import ResultStore
+
+_NEEDED = ("joblib", "matplotlib", "mink", "mujoco", "pyarrow", "SALib", "scipy")
+
+
+def need_study() -> None:
+    """Check that what studies need is installed, before anything of it is imported.
+
+    Raises:
+        GhestError: It is not; names the extra.
+    """
+    missing = [name for name in _NEEDED if importlib.util.find_spec(name) is None]
+    if missing:
+        raise GhestError(f"studies need {', '.join(missing)}: pip install 'ghest-rt[study]'")
+
+
+def executor(workers: int | None, scheduler: str | None) -> Executor:
+    """Return what carries out the tasks: a Dask cluster if its scheduler is named, otherwise this machine's cores."""
+    return LocalExecutor(workers) if scheduler is None else ClusterExecutor(scheduler)
+
+
+def store_in(out: Path) -> ResultStore:
+    """Return where tasks' results are kept, below the results folder and common to all studies in it."""
+    return ResultStore(out / "tasks")
+
+
+@contextmanager
+def shown_progress(title: str) -> Iterator[Callable[[float, float], None]]:
+    """Show a bar with the time left on standard error, if that is a terminal; yields what to tell (done, total)."""
+    console = Console(stderr=True)
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.percentage:>3.0f} %"),
+        TimeElapsedColumn(),
+        TextColumn("left"),
+        TimeRemainingColumn(compact=True),
+    )
+    with Progress(*columns, console=console, disable=not console.is_terminal, transient=True, speed_estimate_period=600) as bar:
+        task = bar.add_task(title, total=None)
+        yield lambda done, total: bar.update(task, completed=done, total=total)

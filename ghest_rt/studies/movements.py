@@ -1,0 +1,58 @@
+"""The movements that studies run through: the paper's, or recorded ones."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from ghest_rt.estimation.pipeline import Method
+from ghest_rt.simulation.opensim_file import read_motion_table
+from ghest_rt.simulation.sensors import find_sensors
+from ghest_rt.simulation.therapy import find_movement
+from ghest_rt.studies.paper_values import MOVEMENTS
+from ghest_rt.studies.session.scenario import Scenario, motion_file
+
+METHODS: tuple[Method, ...] = ("paper", "refined", "fused")
+"""The methods that studies compare unless told otherwise."""
+
+
+@dataclass(frozen=True, slots=True)
+class Movements:
+    """What the simulated patient does in a study.
+
+    Attributes:
+        names: Movements of Table 2; all four if neither these nor `motions` are given.
+        motions: OpenSim motion files.
+        duration_s: Only the first seconds of each; None for all.
+    """
+
+    names: tuple[str, ...] = ()
+    motions: tuple[Path, ...] = ()
+    duration_s: float | None = None
+
+    def scenarios(self, sensor: Literal["paper", "sr300"], seed: int, methods: Sequence[Method]) -> list[Scenario]:
+        """Return the undisturbed session of every movement.
+
+        Raises:
+            BadInputError: A movement is unknown, or a motion file cannot be read.
+        """
+        names = self.names or (() if self.motions else MOVEMENTS)
+        common = {"sensor": sensor, "seed": seed, "duration_s": self.duration_s, "methods": tuple(methods)}
+        named = [Scenario.model_validate({"movement": find_movement(name).name, **common}) for name in names]
+        recorded = [Scenario.model_validate({"motion": motion_file(path), **common}) for path in self.motions]
+        return named + recorded
+
+
+def frames_of(scenario: Scenario) -> int:
+    """Return how many frames each camera takes, about.
+
+    Raises:
+        BadInputError: The motion file cannot be read.
+    """
+    if scenario.motion is not None:
+        t_s = read_motion_table(Path(scenario.motion.path)).t_s
+        whole_s = float(t_s[-1] - t_s[0])
+    else:
+        whole_s = find_movement(scenario.movement or "").duration_s
+    duration_s = whole_s if scenario.duration_s is None else min(scenario.duration_s, whole_s)
+    return round(duration_s * find_sensors(scenario.sensor).camera.rate_hz)
