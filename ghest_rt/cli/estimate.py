@@ -15,6 +15,7 @@ from ghest_rt.estimation.offline import estimate_events
 from ghest_rt.estimation.pipeline import Pipeline
 from ghest_rt.messages.results import Status
 from ghest_rt.recording.reader import Recording
+from ghest_rt.service.compose import signs_of
 
 _log = logging.getLogger(__name__)
 
@@ -29,6 +30,7 @@ def estimate(path: Path, method: Method | None, out: Path, station_file: Path | 
     recording = Recording(path)
     station = recording.station if station_file is None else load_station(station_file)
     pipeline = Pipeline(station, recording.camera_infos, recording.encoder_joints, None if method is None else method.value)
+    signs = signs_of(station.config.joint)
     rows: list[Row] = []
     statuses: Counter[Status] = Counter()
     console = Console(stderr=True)
@@ -37,7 +39,7 @@ def estimate(path: Path, method: Method | None, out: Path, station_file: Path | 
         first_ns: int | None = None
         for seq, sample in enumerate(estimate_events(recording.events(), pipeline, t_0_ns=recording.grid_t_0_ns)):
             first_ns = sample.t_sample_ns if first_ns is None else first_ns
-            rows.append(row_of(seq, sample, station.config.station.arm))
+            rows.append(row_of(seq, sample, station.config.station.arm, signs))
             statuses[sample.status] += 1
             if seq % 50 == 0:
                 progress.update(task, completed=sample.t_sample_ns - first_ns)

@@ -206,4 +206,6 @@ class _Replayer:
 
     def _composer(self, station: LoadedStation, method: str, unix_offset_ns: int) -> AnglesComposer:
         config = station.config
-        return AnglesComposer(config.station.arm, method, config.calibration.id, unix_offset_ns, self._numbering)
+        return AnglesComposer(
+            config.station.arm, method, config.calibration.id, unix_offset_ns, self._numbering, joint=config.joint
+        )

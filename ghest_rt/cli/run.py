@@ -104,7 +104,12 @@ def run_station(options: RunOptions) -> None:
                 encoders=encoders,
                 make_pipeline=lambda infos, joints: Pipeline(station, infos, joints, method),
                 composer=AnglesComposer(
-                    config.station.arm, method, config.calibration.id, time.time_ns() - clock.now_ns(), Numbering()
+                    config.station.arm,
+                    method,
+                    config.calibration.id,
+                    time.time_ns() - clock.now_ns(),
+                    Numbering(),
+                    config.joint,
                 ),
                 outputs=(*outputs, view, manager),
                 clock=clock,

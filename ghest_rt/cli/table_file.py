@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 from ghest_rt.errors import BadInputError
-from ghest_rt.estimation.angles import Arm
+from ghest_rt.estimation.angles import GH_SIGNS, AngleSigns, Arm
 from ghest_rt.geometry.so3 import quat_wxyz_from_matrix
 from ghest_rt.messages.results import GhEstimate
 from ghest_rt.service.compose import clinical_deg, sigma_of
@@ -40,7 +40,7 @@ COLUMNS = ("seq", "t_capture_ns", "status", "reason", *_NUMBERS)
 Writer = Callable[[Path, Sequence[Row]], None]
 
 
-def row_of(seq: int, estimate: GhEstimate, arm: Arm) -> Row:
+def row_of(seq: int, estimate: GhEstimate, arm: Arm, signs: AngleSigns = GH_SIGNS) -> Row:
     """Return an estimate as a row of `COLUMNS`; without angles the numbers are None.
 
     The quaternion is the arm in the GH frame, `arm_*` its position in the m0 frame, `m0_*` and `m1_*` the markers in the base
@@ -50,7 +50,7 @@ def row_of(seq: int, estimate: GhEstimate, arm: Arm) -> Row:
     R, m0_from_arm = estimate.gh_from_arm, estimate.m0_from_arm
     if R is None or m0_from_arm is None:
         return (*head, *([None] * len(_NUMBERS)))
-    angles, sigma = clinical_deg(R, arm), sigma_of(R, estimate.covariance)
+    angles, sigma = clinical_deg(R, arm, signs), sigma_of(R, estimate.covariance)
     markers: list[float | None] = []
     for pose in (estimate.e_from_m0, estimate.e_from_m1):
         markers.extend([None] * 3 if pose is None else pose[:3, 3].tolist())

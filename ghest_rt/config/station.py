@@ -36,6 +36,18 @@ class Station(Strict):
     arm: Literal["right", "left"] = Field(description="The patient's arm in the exoskeleton; sets the clinical signs")
 
 
+Sign = Literal[-1, 1]
+
+
+class Joint(Strict):
+    """Which joint is measured: marker m0 sits on its proximal body, m1 on its distal one; docs/other-limbs.md."""
+
+    name: Name = Field(default="gh", description="Told in every sample as `joint`")
+    flexion_sign: Sign = Field(default=-1, description="Of the y-x-z angle a in `flexion`")
+    abduction_sign: Sign = Field(default=-1, description="Of b in `abduction`, right side; the other way round on the left")
+    rotation_sign: Sign = Field(default=1, description="Of g in `rotation`, right side; the other way round on the left")
+
+
 class Exoskeleton(Strict):
     """The kinematic model and the settings made for this patient."""
 
@@ -138,6 +150,7 @@ class StationConfig(Strict):
     format: Literal[1]
     station: Station
     rate_hz: float = Field(default=66.6, ge=1.0, le=500.0, description="Publishing rate")
+    joint: Joint = Joint()
     exoskeleton: Exoskeleton
     markers: dict[Name, Marker]
     cameras: dict[Name, Camera]

@@ -43,6 +43,19 @@ class EulerYxz:
 
 
 @dataclass(frozen=True, slots=True)
+class AngleSigns:
+    """What turns (a, b, g) of a right side into flexion, abduction and rotation; b and g change sign on the left."""
+
+    flexion: int = -1
+    abduction: int = -1
+    rotation: int = 1
+
+
+GH_SIGNS = AngleSigns()
+"""Of the glenohumeral joint."""
+
+
+@dataclass(frozen=True, slots=True)
 class ClinicalAngles:
     """The same angles with clinical signs: a mirrored movement of the other arm has the same values.
 
@@ -78,10 +91,15 @@ def rotation_from_euler_yxz(a_rad: float, b_rad: float, g_rad: float) -> Array:
     return rot_y(a_rad) @ rot_x(b_rad) @ rot_z(g_rad)
 
 
-def clinical(euler: EulerYxz, arm: Arm) -> ClinicalAngles:
+def clinical(euler: EulerYxz, arm: Arm, signs: AngleSigns = GH_SIGNS) -> ClinicalAngles:
     """Return the clinical names and signs of the paper's angles."""
     side = 1.0 if arm == "right" else -1.0
-    return ClinicalAngles(-euler.a_rad, -side * euler.b_rad, side * euler.g_rad, euler.near_singularity)
+    return ClinicalAngles(
+        signs.flexion * euler.a_rad,
+        signs.abduction * side * euler.b_rad,
+        signs.rotation * side * euler.g_rad,
+        euler.near_singularity,
+    )
 
 
 def rotation_from_clinical(flexion_rad: float, abduction_rad: float, rotation_rad: float, arm: Arm) -> Array:

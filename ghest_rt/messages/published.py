@@ -110,6 +110,7 @@ class GhAngles(_Message):
     )
     method: str
     calibration_id: str
+    joint: str = Field(default="gh", description="What is measured; another joint than gh has no isb_yxy_deg, swing_twist_deg")
     drift: Drift | None = Field(default=None, description="Of the markers; null when lost or where the method does not look")
     elbow_deg: Elbow | None = Field(default=None, description="Null when lost or where the station file has no [elbow]")
     elbow_sigma_deg: Elbow | None = Field(default=None, description="Standard deviations of elbow_deg")

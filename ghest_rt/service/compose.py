@@ -6,7 +6,8 @@ from typing import Literal
 
 import numpy as np
 
-from ghest_rt.estimation.angles import Arm, clinical, euler_yxz
+from ghest_rt.config.station import Joint
+from ghest_rt.estimation.angles import GH_SIGNS, AngleSigns, Arm, clinical, euler_yxz
 from ghest_rt.estimation.isb import isb_yxy
 from ghest_rt.estimation.swing_twist import swing_twist
 from ghest_rt.estimation.uncertainty import euler_sigma_rad
@@ -25,9 +26,14 @@ def sigma_of(gh_from_arm: Array, covariance: Array | None) -> Clinical | None:
     return Clinical(flexion=a, abduction=b, rotation=g)
 
 
-def clinical_deg(gh_from_arm: Array, arm: Arm) -> Clinical:
+def signs_of(joint: Joint) -> AngleSigns:
+    """Return the signs that the station file gives the angles of its joint."""
+    return AngleSigns(joint.flexion_sign, joint.abduction_sign, joint.rotation_sign)
+
+
+def clinical_deg(gh_from_arm: Array, arm: Arm, signs: AngleSigns = GH_SIGNS) -> Clinical:
     """Return the clinical angles, degrees."""
-    angles = clinical(euler_yxz(gh_from_arm), arm)
+    angles = clinical(euler_yxz(gh_from_arm), arm, signs)
     return Clinical(
         flexion=math.degrees(angles.flexion_rad),
         abduction=math.degrees(angles.abduction_rad),
@@ -93,7 +99,16 @@ class Numbering:
 class AnglesComposer:
     """Fills in what every message of a run has in common."""
 
-    def __init__(self, arm: Arm, method: str, calibration_id: str, unix_offset_ns: int, numbering: Numbering) -> None:
+    def __init__(
+        self,
+        arm: Arm,
+        method: str,
+        calibration_id: str,
+        unix_offset_ns: int,
+        numbering: Numbering,
+        *,
+        joint: Joint | None = None,
+    ) -> None:
         """Prepare the run.
 
         Args:
@@ -102,12 +117,16 @@ class AnglesComposer:
             calibration_id: From the station file.
             unix_offset_ns: Unix time minus the service's clock.
             numbering: Where the sequence numbers come from.
+            joint: The station file's joint; None for the glenohumeral one.
         """
         self.numbering = numbering
         self._arm: Arm = arm
         self._method = method
         self._calibration_id = calibration_id
         self._unix_offset_ns = unix_offset_ns
+        self._joint = joint or Joint()
+        self._signs = signs_of(self._joint)
+        self._is_gh = self._joint.name == Joint().name
 
     def unix_ns(self, t_ns: int) -> int:
         """Return Unix time of an instant of the service's clock."""
@@ -127,16 +146,29 @@ class AnglesComposer:
             "age_ms": {name: (t_publish_ns - newest_ns[name]) * 1e-6 if name in newest_ns else None for name in _INPUTS},
             "method": self._method,
             "calibration_id": self._calibration_id,
+            "joint": self._joint.name,
         }
         if R is None or estimate.m0_from_arm is None:
             return GhAngles.model_validate(common | _NO_ANGLES)
         elbow, elbow_sigma = elbow_of(estimate.elbow)
-        euler, isb, swing = euler_yxz(R), isb_yxy(R, self._arm), swing_twist(R, self._arm)
+        euler = euler_yxz(R)
         angles = {
-            "angles_deg": clinical_deg(R, self._arm),
+            "angles_deg": clinical_deg(R, self._arm, self._signs),
             "sigma_deg": sigma_of(R, estimate.covariance),
             "euler_yxz_deg": (math.degrees(euler.a_rad), math.degrees(euler.b_rad), math.degrees(euler.g_rad)),
             "quaternion_wxyz": tuple(quat_wxyz_from_matrix(R).tolist()),
+            "arm_position_m": tuple(estimate.m0_from_arm[:3, 3].tolist()),
+            "drift": drift_of(estimate.drift),
+            "elbow_deg": elbow,
+            "elbow_sigma_deg": elbow_sigma,
+            **(self._sets_of_gh(R, euler.near_singularity) if self._is_gh else _no_sets_of_gh(euler.near_singularity)),
+        }
+        return GhAngles.model_validate(common | angles)
+
+    def _sets_of_gh(self, R: Array, near_singularity: bool) -> dict[str, object]:
+        """Return the sets of angles that only the glenohumeral joint has, and which sets are near their singularity."""
+        isb, swing = isb_yxy(R, self._arm), swing_twist(R, self._arm)
+        return {
             "isb_yxy_deg": IsbYxy(
                 plane_of_elevation=math.degrees(isb.plane_of_elevation_rad),
                 elevation=math.degrees(isb.elevation_rad),
@@ -150,17 +182,17 @@ class AnglesComposer:
                 azimuth=math.degrees(swing.azimuth_rad),
             ),
             "singular": Singular(
-                euler_yxz=euler.near_singularity,
+                euler_yxz=near_singularity,
                 isb_yxy=isb.near_singularity,
                 swing_twist=swing.near_singularity,
                 azimuth=swing.azimuth_near_singularity,
             ),
-            "arm_position_m": tuple(estimate.m0_from_arm[:3, 3].tolist()),
-            "drift": drift_of(estimate.drift),
-            "elbow_deg": elbow,
-            "elbow_sigma_deg": elbow_sigma,
         }
-        return GhAngles.model_validate(common | angles)
+
+
+def _no_sets_of_gh(near_singularity: bool) -> dict[str, object]:
+    singular = Singular(euler_yxz=near_singularity, isb_yxy=False, swing_twist=False, azimuth=False)
+    return {"isb_yxy_deg": None, "swing_twist_deg": None, "singular": singular}
 
 
 _NO_ANGLES = dict.fromkeys(
