@@ -22,9 +22,9 @@ _ARM_DOFS = ("patient_protraction", "patient_elevation", "patient_gh", "patient_
 class CoupledChain:
     """The patient's limb follows the cuffs: two degrees of freedom of the girdle, three of the GH joint, one of the elbow.
 
-    The upper arm's cuff keeps the exoskeleton's elbow pivot (link l5) where it is on the humerus, the forearm's keeps the direction of
-    the forearm module (link l8) on the forearm. Both are taken from the neutral posture. Of the postures that satisfy
-    them, the one with the girdle nearest to rest is chosen; the trunk stands still.
+    The upper arm's cuff keeps the exoskeleton's elbow pivot (link l5) where it is on the humerus, the forearm's keeps the
+    direction of the forearm module (link l8) on the forearm. Both are taken from the neutral posture. Of the postures that
+    satisfy them, the one with the girdle nearest to rest is chosen; the trunk stands still.
     """
 
     def __init__(self, calibration: NeutralCalibration) -> None:

@@ -44,7 +44,7 @@ class NeutralMotion:
         """What it is called."""
         return "neutral"
 
-    def at(self, t_s: float) -> Posture:  # noqa: ARG002 - the same at any time
+    def at(self, t_s: float) -> Posture:
         """Return the posture."""
         return _POSTURE
 

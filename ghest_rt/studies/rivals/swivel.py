@@ -1,9 +1,10 @@
 """Rivals 3 and 4: the arm's posture from the pose of the hand and a rule for the swivel angle (the paper's [17]-[20]).
 
-The hand's pose leaves one freedom: the elbow may swivel about the line from shoulder to wrist. [18, 19] choose the swivel that lets
-the palm be retracted to the head most readily: the projection of the longest axis of the arm's manipulability
+The hand's pose leaves one freedom: the elbow may swivel about the line from shoulder to wrist. [18, 19] choose the swivel that
+lets the palm be retracted to the head most readily: the projection of the longest axis of the arm's manipulability
 ellipsoid on the way from wrist to mouth is greatest when the plane of the arm contains the mouth, elbow on the far side.
-[17] adds an offset for the orientation of the wrist: the joints of forearm and wrist shall keep away from the ends of their ranges.
+[17] adds an offset for the orientation of the wrist: the joints of forearm and wrist shall keep away from the ends of their
+ranges.
 """
 
 import math
@@ -24,8 +25,8 @@ _LEAST_SINE = 0.05
 class SwivelAngle:
     """The arm from shoulder, wrist and a swivel angle.
 
-    The shoulder stands still where it was in the neutral posture; the hand is fixed to the grip (l10), the wrist to the forearm module (l8),
-    as they were then. The rule is corrected by what it was wrong in the neutral posture.
+    The shoulder stands still where it was in the neutral posture; the hand is fixed to the grip (l10), the wrist to the forearm
+    module (l8), as they were then. The rule is corrected by what it was wrong in the neutral posture.
     """
 
     def __init__(self, calibration: NeutralCalibration, *, wrist_aware: bool) -> None:

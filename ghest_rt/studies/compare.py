@@ -1,0 +1,126 @@
+"""`study compare`: Table 7 made real. Every contender on the same sessions, beside what its own publication reports."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from statistics import fmean
+from typing import Literal, cast
+
+from ghest_rt.studies.compare_verdicts import verdict
+from ghest_rt.studies.engine.run import Executor, Progress, run_tasks
+from ghest_rt.studies.engine.store import ResultStore
+from ghest_rt.studies.movements import METHODS, Movements, frames_of
+from ghest_rt.studies.rivals.angle_errors import QUANTITIES
+from ghest_rt.studies.rivals.contenders import CONTENDERS
+from ghest_rt.studies.rivals.tasks import compare_task
+from ghest_rt.studies.session.scenario import Scenario
+
+SensorName = Literal["paper", "sr300"]
+Row = dict[str, object]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CompareSettings:
+    """What is compared on.
+
+    Attributes:
+        movements: What the patient does.
+        sensors: Kinds of sensors.
+        seeds: How many seeds, from 1 on.
+    """
+
+    movements: Movements
+    sensors: tuple[SensorName, ...] = ("paper",)
+    seeds: int = 1
+
+
+QUICK = CompareSettings(movements=Movements(("COMB",), duration_s=1.5))
+"""Enough to see that everything runs."""
+
+
+def compare(
+    settings: CompareSettings, store: ResultStore, executor: Executor, progress: Progress | None = None
+) -> dict[str, object]:
+    """Run the comparison; return its summary, as JSON takes it.
+
+    Returns:
+        `settings`; `rows`, one per sensor, movement, seed and contender; `contenders`, with their publications' figures and the
+        means over movements; `verdicts`, one per sensor, movement and contender.
+
+    Raises:
+        BadInputError: A motion file cannot be read.
+        GhestError: Tasks failed.
+    """
+    scenarios = [
+        scenario
+        for sensor in settings.sensors
+        for seed in range(1, settings.seeds + 1)
+        for scenario in settings.movements.scenarios(sensor, seed, METHODS)
+    ]
+    results = run_tasks([compare_task(s, frames_of(s)) for s in scenarios], store, executor, progress)
+    rows = [row for scenario, result in zip(scenarios, results, strict=True) for row in _rows(scenario, result)]
+    return {
+        "study": "compare",
+        "settings": {
+            "movements": list(dict.fromkeys(scenario.name for scenario in scenarios)),
+            "sensors": list(settings.sensors),
+            "seeds": settings.seeds,
+            "duration_s": settings.movements.duration_s,
+        },
+        "rows": rows,
+        "contenders": [{**asdict(who), "measured": _means(rows, key)} for key, who in CONTENDERS.items()],
+        "verdicts": _verdicts(rows),
+    }
+
+
+def _rows(scenario: Scenario, result: Mapping[str, object]) -> list[Row]:
+    found = cast(Mapping[str, Mapping[str, float]], result["contenders"])
+    return [
+        {
+            "sensor": scenario.sensor,
+            "movement": scenario.name,
+            "kind": "recorded" if scenario.motion is not None else "therapy",
+            "seed": scenario.seed,
+            "contender": key,
+            **found[key],
+            "duration_s": result["duration_s"],
+            "girdle_turn_deg": result["girdle_turn_deg"],
+        }
+        for key in CONTENDERS
+    ]
+
+
+def _means(rows: Sequence[Row], key: str) -> list[Row]:
+    """Return the means over movements and seeds, by sensor and kind of movement, as the paper's last column."""
+    mine = [row for row in rows if row["contender"] == key]
+    groups = dict.fromkeys((str(row["sensor"]), str(row["kind"])) for row in mine)
+    return [
+        {"sensor": sensor, "kind": kind, **_mean([row for row in mine if (row["sensor"], row["kind"]) == (sensor, kind)])}
+        for sensor, kind in groups
+    ]
+
+
+def _mean(rows: Sequence[Row]) -> Row:
+    return {name: mean_of(rows, name) for name in (*QUANTITIES, "answered_fraction")}
+
+
+def mean_of(rows: Sequence[Mapping[str, object]], name: str) -> float:
+    """Return the mean of a column over the rows that have it; NaN if none does."""
+    values = [float(cast(float, row[name])) for row in rows if row[name] is not None]
+    finite = [value for value in values if math.isfinite(value)]
+    return fmean(finite) if finite else math.nan
+
+
+def _verdicts(rows: Sequence[Row]) -> list[Row]:
+    """Return for every sensor, movement and contender whether `fused` wins, by the means over seeds."""
+    sessions = list(dict.fromkeys((str(row["sensor"]), str(row["movement"])) for row in rows))
+    verdicts: list[Row] = []
+    for sensor, movement in sessions:
+        there = [row for row in rows if (row["sensor"], row["movement"]) == (sensor, movement)]
+        figures = {key: _mean([row for row in there if row["contender"] == key]) for key in CONTENDERS}
+        lag_ms = {str(row["contender"]): float(cast(float, row["lag_ms"])) for row in there}
+        for key, who in CONTENDERS.items():
+            if key != "fused":
+                said = verdict(who, cast(dict[str, float], figures[key]), cast(dict[str, float], figures["fused"]), lag_ms[key])
+                verdicts.append({"sensor": sensor, "movement": movement, "contender": key, **asdict(said)})
+    return verdicts

@@ -1,0 +1,63 @@
+"""Whether `fused` wins a row of the comparison, and if not, why."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from ghest_rt.studies.rivals.angle_errors import ANGLES
+from ghest_rt.studies.rivals.contenders import Contender
+
+_JUDGED = ("orientation_deg", *ANGLES)
+_WORDS = {
+    "orientation_deg": "orientation",
+    "flexion_deg": "flexion",
+    "abduction_deg": "abduction",
+    "rotation_deg": "rotation",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """The outcome of one row.
+
+    Attributes:
+        fused_wins: Whether `fused` has the smaller error in the rotation and in each angle, each judged at its own instant.
+        fused_wins_when_published: Whether its rotation is nearer at the instant at which each answer is published.
+        lost_in: Quantities in which it does not win.
+        verdict: The statement.
+    """
+
+    fused_wins: bool
+    fused_wins_when_published: bool
+    lost_in: tuple[str, ...]
+    verdict: str
+
+
+def verdict(who: Contender, theirs: Mapping[str, float], fused: Mapping[str, float], lag_ms: float) -> Verdict:
+    """Return the outcome of a row.
+
+    Args:
+        who: The contender.
+        theirs: Its RMS errors by quantity, degrees; NaN where nothing was judged.
+        fused: Those of `fused`.
+        lag_ms: How long after an instant the contender's answer is published.
+    """
+    if math.isnan(theirs["orientation_deg"]):
+        return Verdict(True, True, (), f"fused wins: {who.title} has no answer at all")
+    lost = tuple(name for name in _JUDGED if fused[name] >= theirs[name])
+    published = fused["published_deg"] < theirs["published_deg"]
+    figures = f"{_deg(fused['orientation_deg'])} against {_deg(theirs['orientation_deg'])}"
+    if not lost:
+        return Verdict(True, published, (), f"fused wins: {figures}")
+    where = ", ".join(f"{_WORDS[name]} {_deg(fused[name])} against {_deg(theirs[name])}" for name in lost)
+    if published and lag_ms > 0.0:
+        late = (
+            f"but that answer is published {lag_ms:.0f} ms after its instant; at the instants of publishing fused wins, "
+            f"{_deg(fused['published_deg'])} against {_deg(theirs['published_deg'])}"
+        )
+        return Verdict(False, True, lost, f"judged at its own instant {who.title} is nearer ({where}), {late}")
+    return Verdict(False, published, lost, f"fused does not win ({where}); {who.title} has on its side: {who.strength}")
+
+
+def _deg(value: float) -> str:
+    return f"{value:.3f} deg" if value < 1.0 else f"{value:.2f} deg"

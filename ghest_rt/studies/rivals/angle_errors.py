@@ -1,0 +1,110 @@
+"""Errors of GH angles: as a rotation (exponential map, 3.4.2) and angle by angle, also judged when an answer is published."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ghest_rt.estimation.angles import clinical, euler_yxz
+from ghest_rt.geometry.so3 import Array, angle_between_rad
+from ghest_rt.messages.results import GhEstimate, TruthSample
+from ghest_rt.studies.truth import TruthTrack
+
+ANGLES = ("flexion_deg", "abduction_deg", "rotation_deg")
+QUANTITIES = ("orientation_deg", "published_deg", *ANGLES, "plane_deg")
+"""What is judged: the rotation at the sample's own instant; the same when it is published, `lag` later; the clinical angles;
+the plane of shoulder, elbow and wrist (what the swivel angle tells)."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Answers:
+    """What a method said at the instants of the grid.
+
+    Attributes:
+        t_ns: The instants.
+        gh_from_arm: At each the (3, 3) rotation, or None.
+        lag_ns: How long after its instant an answer is published.
+    """
+
+    t_ns: Sequence[int]
+    gh_from_arm: Sequence[Array | None]
+    lag_ns: int
+
+    @classmethod
+    def of(cls, estimates: Sequence[GhEstimate], lag_ns: int) -> "Answers":
+        """Return the answers in estimates."""
+        return cls([e.t_sample_ns for e in estimates], [e.gh_from_arm for e in estimates], lag_ns)
+
+
+def truth_track(samples: Sequence[TruthSample]) -> TruthTrack:
+    """Return the truth at any instant from samples in the order of time."""
+    track = TruthTrack()
+    for sample in samples:
+        track.add(sample)
+    return track
+
+
+def error_columns(answers: Answers, truth: TruthTrack) -> dict[str, Array]:
+    """Return each of `QUANTITIES` at every instant, degrees: (n,), signed for the angles, NaN where there is nothing to judge.
+
+    Single angles are not judged where the true posture is within 10 degrees of their singularity.
+    """
+    rows = [
+        _errors(rotation, truth.at(t_ns), truth.at(t_ns + answers.lag_ns))
+        for t_ns, rotation in zip(answers.t_ns, answers.gh_from_arm, strict=True)
+    ]
+    table = np.array(rows, dtype=np.float64).reshape(-1, len(QUANTITIES))
+    return {name: table[:, k] for k, name in enumerate(QUANTITIES)}
+
+
+def error_statistics(answers: Answers, truth: TruthTrack) -> dict[str, float | int]:
+    """Return the root mean square of each of `QUANTITIES`, the greatest orientation error, and how much was judged."""
+    columns = error_columns(answers, truth)
+    known = np.array([truth.at(t_ns) is not None for t_ns in answers.t_ns], dtype=bool)
+    orientation = columns["orientation_deg"]
+    answered = int(np.isfinite(orientation).sum())
+    return {
+        **{name: _rms(values) for name, values in columns.items()},
+        "max_deg": float(np.nanmax(orientation)) if answered else math.nan,
+        "samples": int(known.sum()),
+        "answered_fraction": answered / max(1, int(known.sum())),
+        "angles_judged_fraction": int(np.isfinite(columns["flexion_deg"]).sum()) / max(1, answered),
+    }
+
+
+def girdle_turn_deg(truth: Sequence[TruthSample]) -> float:
+    """Return by how much the scapula turns in E, RMS against the neutral posture: what no encoder of the exoskeleton sees."""
+    turns = [math.degrees(angle_between_rad(t.e_from_arm[:3, :3], t.gh_from_arm)) for t in truth]
+    return _rms(np.array(turns))
+
+
+def _errors(rotation: Array | None, at: TruthSample | None, published: TruthSample | None) -> list[float]:
+    if rotation is None or at is None:
+        return [math.nan] * len(QUANTITIES)
+    true = at.gh_from_arm
+    late = math.nan if published is None else math.degrees(angle_between_rad(published.gh_from_arm, rotation))
+    cosine = float(np.clip(rotation[:, 0] @ true[:, 0], -1.0, 1.0))
+    return [
+        math.degrees(angle_between_rad(true, rotation)),
+        late,
+        *_angle_errors_deg(rotation, true),
+        math.degrees(math.acos(cosine)),
+    ]
+
+
+def _angle_errors_deg(rotation: Array, true: Array) -> list[float]:
+    said, meant = clinical(euler_yxz(rotation), "right"), clinical(euler_yxz(true), "right")
+    if meant.near_singularity:
+        return [math.nan] * len(ANGLES)
+    differences = (
+        said.flexion_rad - meant.flexion_rad,
+        said.abduction_rad - meant.abduction_rad,
+        said.rotation_rad - meant.rotation_rad,
+    )
+    return [math.degrees(math.remainder(d, 2.0 * math.pi)) for d in differences]
+
+
+def _rms(values: Array) -> float:
+    finite = values[np.isfinite(values)]
+    return float(np.sqrt(np.mean(np.square(finite)))) if finite.size else math.nan

@@ -1,0 +1,126 @@
+"""The tasks of the comparison: a session with ArUco markers, and every contender judged on a session."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, cast
+
+import cv2
+import numpy as np
+
+from ghest_rt.estimation.pipeline import lag_ns_of
+from ghest_rt.messages.results import MarkerObservation
+from ghest_rt.simulation.command import SimulateOptions, build_world
+from ghest_rt.simulation.world import World
+from ghest_rt.studies.engine.task import Result, Task
+from ghest_rt.studies.rivals.angle_errors import Answers, error_statistics, girdle_turn_deg, truth_track
+from ghest_rt.studies.rivals.running import run_without_cameras
+from ghest_rt.studies.session.estimating import estimate_session
+from ghest_rt.studies.session.observed import Observed, observe
+from ghest_rt.studies.session.packing import unpack
+from ghest_rt.studies.session.scenario import Scenario
+from ghest_rt.studies.session.tasks import observe_task
+from ghest_rt.vision.aruco import ArucoDetector
+
+_HERE = "ghest_rt.studies.rivals.tasks"
+_FRAME_COST = {"paper": 1.0, "sr300": 16.0}
+_COMPARE_COST = 4.0
+_REFINEMENT = {
+    "aruco": cv2.aruco.CORNER_REFINE_NONE,
+    "aruco_subpixel": cv2.aruco.CORNER_REFINE_SUBPIX,
+}
+
+
+def compare_task(scenario: Scenario, frames: int) -> Task:
+    """Return the task that judges every contender on a session of about `frames` frames of each camera."""
+    aruco = Task.of(
+        f"{_HERE}:answer_with_aruco",
+        scenario.model_dump(mode="json"),
+        cost=2 * frames * _FRAME_COST[scenario.sensor],
+    )
+    needs = (observe_task(scenario, frames), aruco)
+    return Task.of(f"{_HERE}:compare_session", scenario.model_dump(mode="json"), needs=needs, cost=_COMPARE_COST * frames)
+
+
+def answer_with_aruco(parameters: dict[str, object], needs: Sequence[Result]) -> Result:
+    """Render the session with ArUco markers; return the rotations found from OpenCV's default corners and from refined ones."""
+    scenario = Scenario.model_validate(parameters)
+    world = _aruco_world(scenario)
+    seen = _observe_aruco(world)
+    session = observe(world, (), ())
+    arrays: dict[str, Any] = {}
+    for key, markers in seen.items():
+        estimates = estimate_session(replace(session, markers=markers), "aruco")
+        arrays[f"{key}_t"] = np.array([e.t_sample_ns for e in estimates])
+        arrays[f"{key}_R"] = np.array([np.full((3, 3), np.nan) if e.gh_from_arm is None else e.gh_from_arm for e in estimates])
+    return Result({"lag_ns": lag_ns_of(world.station.config, "aruco")}, arrays)
+
+
+def compare_session(parameters: dict[str, object], needs: Sequence[Result]) -> Result:
+    """Judge every contender: its error statistics by key, and what the girdle did."""
+    scenario = Scenario.model_validate(parameters)
+    session = unpack(needs[0])
+    answers = _marker_answers(session, scenario)
+    answers.update(_aruco_answers(needs[1]))
+    instants_ns = answers["refined"].t_ns
+    answers.update(run_without_cameras(session, scenario.sensor, scenario.seed, instants_ns))
+    truth = truth_track(session.truth)
+    return Result(
+        {
+            "duration_s": (instants_ns[-1] - instants_ns[0]) * 1e-9 if len(instants_ns) else 0.0,
+            "girdle_turn_deg": girdle_turn_deg(session.truth),
+            "contenders": {
+                key: {**error_statistics(said, truth), "lag_ms": said.lag_ns * 1e-6} for key, said in answers.items()
+            },
+        }
+    )
+
+
+def _marker_answers(session: Observed, scenario: Scenario) -> dict[str, Answers]:
+    return {
+        method: Answers.of(estimate_session(session, method), lag_ns_of(session.station.config, method))
+        for method in scenario.methods
+    }
+
+
+def _aruco_answers(result: Result) -> dict[str, Answers]:
+    arrays, lag_ns = cast(dict[str, Any], result.arrays), cast(int, result.values["lag_ns"])
+    return {
+        key: Answers(arrays[f"{key}_t"].tolist(), [None if np.isnan(R[0, 0]) else R for R in arrays[f"{key}_R"]], lag_ns)
+        for key in _REFINEMENT
+    }
+
+
+def _aruco_world(scenario: Scenario) -> World:
+    return build_world(
+        SimulateOptions(
+            out=Path(),
+            movement=scenario.movement,
+            motion=None if scenario.motion is None else Path(scenario.motion.path),
+            sensor=scenario.sensor,
+            seed=scenario.seed,
+            duration_s=scenario.duration_s,
+            marker="aruco",
+        )
+    )
+
+
+def _observe_aruco(world: World) -> dict[str, dict[tuple[Any, str], list[MarkerObservation]]]:
+    """Return the observations by contender and (vision method, camera), every frame rendered once."""
+    config = world.station.config
+    seen: dict[str, dict[tuple[Any, str], list[MarkerObservation]]] = {key: {} for key in _REFINEMENT}
+    for camera in world.camera_names:
+        marker = config.cameras[camera].marker
+        detectors = {}
+        for key, refinement in _REFINEMENT.items():
+            parameters = cv2.aruco.DetectorParameters()
+            parameters.cornerRefinementMethod = refinement
+            detectors[key] = ArucoDetector(camera, marker, config.markers[marker], world.camera_info(camera))
+            detectors[key].set_parameters(parameters)
+            seen[key]["aruco", camera] = []
+        for k in range(world.frame_count(camera)):
+            frame = world.frame(camera, k)
+            if frame is not None:
+                for key, detector in detectors.items():
+                    seen[key]["aruco", camera].append(detector.detect(frame))
+    return seen
