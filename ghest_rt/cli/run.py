@@ -109,7 +109,7 @@ def run_station(options: RunOptions) -> None:
                     config.calibration.id,
                     time.time_ns() - clock.now_ns(),
                     Numbering(),
-                    config.joint,
+                    joint=config.joint,
                 ),
                 outputs=(*outputs, view, manager),
                 clock=clock,
