@@ -12,12 +12,12 @@ from ghest_drivers.samples import CameraInfo, RgbdFrame
 from ghest_rt.config.station import Marker
 from ghest_rt.geometry.se3 import inverse
 from ghest_rt.geometry.so3 import Array
-from ghest_rt.simulation.clinic import Clinic
 from ghest_rt.simulation.imaging import ColorSensor, DepthSensor, Light
 from ghest_rt.simulation.optics import Float32, Imaging, aperture_px
 from ghest_rt.simulation.plate import PlateShader
 from ghest_rt.simulation.rays import PixelRays, Region
 from ghest_rt.simulation.sensors import CameraProfile
+from ghest_rt.simulation.stage import Stage
 from ghest_rt.simulation.texture import Texture
 from ghest_rt.simulation.timeline import Timeline
 from ghest_rt.simulation.tracing import Hits, Tracer, shade
@@ -74,7 +74,7 @@ class SimulatedCamera:
 
     def __init__(
         self,
-        clinic: Clinic,
+        clinic: Stage,
         name: str,
         *,
         marker_name: str,
@@ -103,8 +103,8 @@ class SimulatedCamera:
         supersampling = min(profile.supersampling, _BLURRED_SUPERSAMPLING) if imaging.defocus_px else profile.supersampling
         self._shader = PlateShader(texture, marker.plate_m, supersampling, aperture_px(imaging.defocus_px))
         self._defocus_px = imaging.defocus_px
-        self._tracer = Tracer(clinic.scene.model, marker_name)
-        self._data = mujoco.MjData(clinic.scene.model)
+        self._tracer = Tracer(clinic.model, marker_name)
+        self._data = mujoco.MjData(clinic.model)
 
     @property
     def frame_count(self) -> int:

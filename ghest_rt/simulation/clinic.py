@@ -53,6 +53,11 @@ class Clinic:
         self._arm_in_humerus = transform(np.eye(3), (0.0, 0.0, -scene.anatomy.upper_arm_m / 2))
 
     @property
+    def model(self) -> mujoco.MjModel:
+        """The MuJoCo model."""
+        return self.scene.model
+
+    @property
     def duration_s(self) -> float:
         """Length of the movement."""
         return self._motion.duration_s

@@ -5,8 +5,8 @@ import math
 import numpy as np
 
 from ghest_drivers.samples import EncoderInfo, EncoderSample
-from ghest_rt.simulation.clinic import Clinic
 from ghest_rt.simulation.sensors import EncoderProfile
+from ghest_rt.simulation.stage import Stage
 from ghest_rt.simulation.timeline import Timeline
 
 LEAD_S = 0.1
@@ -26,7 +26,7 @@ class SimulatedEncoders:
         seed: Seeds the timing.
     """
 
-    def __init__(self, clinic: Clinic, joints: tuple[str, ...], profile: EncoderProfile, timeline: Timeline, seed: int) -> None:
+    def __init__(self, clinic: Stage, joints: tuple[str, ...], profile: EncoderProfile, timeline: Timeline, seed: int) -> None:
         self.info = EncoderInfo(name="encoders", joint_names=joints)
         self._clinic = clinic
         self._profile = profile
