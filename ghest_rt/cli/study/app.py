@@ -3,6 +3,8 @@
 import typer
 
 from ghest_rt.cli.study.accuracy import accuracy
+from ghest_rt.cli.study.compare import compare
+from ghest_rt.cli.study.latency import latency
 from ghest_rt.cli.study.sensitivity import sensitivity
 
 app = typer.Typer(
@@ -12,3 +14,5 @@ app = typer.Typer(
 )
 app.command()(accuracy)
 app.command()(sensitivity)
+app.command()(compare)
+app.command()(latency)

@@ -1,0 +1,86 @@
+"""`ghest-rt study latency`: how far published angles are behind the arm."""
+
+from pathlib import Path
+from typing import Annotated, Any, cast
+
+import typer
+
+from ghest_rt.cli.options import Sensor
+from ghest_rt.cli.study.options import Duration, Json, Motions, Movements, Out, Quick, Scheduler, Workers
+
+
+def latency(
+    out: Out = Path("out/study"),
+    sensor: Annotated[Sensor, typer.Option(help="Which sensor")] = Sensor.PAPER,
+    speed: Annotated[
+        list[float] | None,
+        typer.Option(
+            min=0.1,
+            max=5.0,
+            metavar="FACTOR",
+            help="Play at this speed; again for more. By default 0.5, 1, 2, 3",
+            show_default=False,
+        ),
+    ] = None,
+    movement: Movements = None,
+    motion: Motions = None,
+    seed: Annotated[int, typer.Option(metavar="N", help="Of the simulation")] = 1,
+    duration: Duration = None,
+    quick: Quick = False,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
+    as_json: Json = False,
+) -> None:
+    """Error at the instant of publishing against the speed of the movement, and the age of the inputs."""
+    from ghest_rt.cli.study.running import executor, need_study, shown_progress, store_in
+
+    need_study()
+    from ghest_rt.cli.console import print_json
+    from ghest_rt.studies import movements as plan
+    from ghest_rt.studies.latency import QUICK, LatencySettings
+    from ghest_rt.studies.latency import latency as run_latency
+    from ghest_rt.studies.report.results import write_results
+
+    names = tuple(m.value for m in movement or ())
+    settings = LatencySettings(
+        movements=plan.Movements(names, tuple(motion or ()), duration),
+        speeds=tuple(speed or (0.5, 1.0, 2.0, 3.0)),
+        sensor=sensor.value,
+        seed=seed,
+    )
+    with shown_progress("latency") as progress:
+        summary = run_latency(QUICK if quick else settings, store_in(out), executor(workers, scheduler), progress)
+    paths = write_results(out, "latency", summary, cast(list[dict[str, Any]], summary["rows"]))
+    if as_json:
+        print_json(summary)
+    else:
+        _print(summary, paths)
+
+
+def _print(summary: dict[str, object], paths: list[Path]) -> None:
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+
+    console = Console()
+    candidates = cast(list[dict[str, Any]], summary["candidates"])
+    table = Table(title="Answers when they are published", title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
+    table.add_column("method", no_wrap=True)
+    for column in ("lag\nms", "image\nms old", "behind\nms", "error\n° RMS"):
+        table.add_column(column, justify="right", no_wrap=True)
+    for who in candidates:
+        age_ms = max(who["age_ms"][camera] or 0.0 for camera in ("r0", "r1"))
+        figures = (f"{who['lag_ms']:.0f}", f"{age_ms:.1f}", f"{who['effective_delay_ms']:.1f}", f"{who['published_deg']:.3f}")
+        table.add_row(who["title"], *figures)
+    console.print(table)
+    table = Table(title="Degrees RMS when published", title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
+    table.add_column("movement", no_wrap=True)
+    for column in ("speed", "°/s RMS", *(who["title"].replace(", ", "\n") for who in candidates)):
+        table.add_column(column, justify="right")
+    rows = cast(list[dict[str, Any]], summary["rows"])
+    for movement, speed in dict.fromkeys((row["movement"], row["speed"]) for row in rows):
+        there = {row["candidate"]: row for row in rows if (row["movement"], row["speed"]) == (movement, speed)}
+        errors = (f"{there[who['key']]['published_deg']:.3f}" for who in candidates)
+        table.add_row(movement, f"{speed:g}", f"{there['fused']['rms_speed_dps']:.1f}", *errors)
+    console.print(table)
+    console.print(f"written: {', '.join(str(path) for path in paths)}", markup=False, highlight=False)
