@@ -1,6 +1,7 @@
 """Updates on their way to one receiver: bounded, so that a slow receiver costs itself samples and nobody else anything."""
 
 import asyncio
+import logging
 import threading
 from collections import deque
 from collections.abc import Callable
@@ -8,6 +9,8 @@ from types import TracebackType
 from typing import Self
 
 from ghest_rt.client.updates import Gap, GapCause, LinkChanged, Sample, Update
+
+_log = logging.getLogger(__name__)
 
 CAPACITY = 2048  # half a minute at 66.6 Hz
 
@@ -139,4 +142,7 @@ class CallbackThread:
 
     def _run(self) -> None:
         while (update := self._updates.get()) is not None:
-            self._callback(update)
+            try:
+                self._callback(update)
+            except Exception:
+                _log.exception("a callback for updates failed; it gets the next one all the same")
