@@ -71,12 +71,12 @@ def _print(summary: dict[str, object], paths: list[Path]) -> None:
             row = who["measured"][k]
             mine = [v for v in verdicts if v["contender"] == who["key"] and v["sensor"] == group["sensor"]]
             mine = [v for v in mine if v["movement"] in _movements(summary, group)]
-            won = f"{sum(v['fused_wins'] for v in mine)} of {len(mine)}" if mine else ""
+            won = f"{sum(v['fused_wins'] for v in mine)}/{len(mine)}" if mine else ""
             figures = ("orientation_deg", "published_deg", "flexion_deg", "abduction_deg", "rotation_deg")
             table.add_row(who["title"], *(_deg(row[name]) for name in figures), won)
         console.print(table)
     console.print(
-        "publ.: judged at the instant of publishing. fused wins: movements in which it is nearer in every column but that."
+        "publ.: judged at the instant of publishing; fused wins: movements in which it is nearer in all other columns"
     )
     console.print("\nWhat their own publications report:", highlight=False)
     for who in contenders:
@@ -90,7 +90,7 @@ def _print(summary: dict[str, object], paths: list[Path]) -> None:
 
 
 def _deg(value: float) -> str:
-    return f"{value:.3f}" if value < 1.0 else f"{value:.2f}"
+    return f"{value:.3f}" if value < 1.0 else f"{value:.3g}"
 
 
 def _movements(summary: dict[str, object], group: dict[str, Any]) -> set[str]:

@@ -18,21 +18,28 @@ _CODE = (
     "messages",
     "simulation",
     "studies/metrics.py",
+    "studies/rivals/angle_errors.py",
     "studies/session",
     "studies/truth.py",
     "sync",
     "vision",
 )
-_LIBRARIES = ("numpy", "mujoco", "opencv-python-headless", "mink", "scipy")
+_LIBRARIES = ("numpy", "mujoco", "opencv-python-headless", "mink", "daqp", "scipy", "imufusion")
 
 
 @cache
 def code_salt(kind: str) -> str:
-    """Return the hash of the code behind tasks of a kind, of the shipped station files, and of the libraries' versions."""
+    """Return the hash of the code behind tasks of a kind, of the shipped station files, and of the libraries' versions.
+
+    The kind's code is its module and those beside it in a package of a study; of `ghest_rt.studies` itself only the module.
+    """
     digest = hashlib.sha256(_common().encode())
     spec = importlib.util.find_spec(kind.partition(":")[0])
     if spec is not None and spec.origin is not None:
-        digest.update(Path(spec.origin).read_bytes())
+        module = Path(spec.origin)
+        beside = [module] if module.parent == Path(__file__).parents[1] else sorted(module.parent.glob("*.py"))
+        for file in beside:
+            digest.update(file.read_bytes())
     return digest.hexdigest()
 
 

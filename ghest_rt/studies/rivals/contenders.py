@@ -91,7 +91,7 @@ CONTENDERS = {
         ),
         Contender(
             key="aruco",
-            title="ArUco markers, OpenCV's defaults",
+            title="ArUco, OpenCV's defaults",
             source="Garrido-Jurado et al. 2014, OpenCV; markers as large as the disks' square, colour images only",
             published="none for GH angles",
             published_deg=None,
@@ -101,7 +101,7 @@ CONTENDERS = {
         ),
         Contender(
             key="aruco_subpixel",
-            title="ArUco markers, sub-pixel corners",
+            title="ArUco, sub-pixel corners",
             source="the same with CORNER_REFINE_SUBPIX: the fair one",
             published="none for GH angles",
             published_deg=None,
