@@ -21,7 +21,9 @@ _CommonName = Annotated[str, Field(pattern=r"^(station|therapy|operator|router)\
 
 # Named one by one: Zenoh lets a query pass if its key expression lies within an allowed one, and a query for ghest/** would
 # reach what ghest/*/calibrate/** forbids.
-_ASKED = ("schema", "config", "calibration", "last", "gh/**")
+ASKED_KEYS = tuple(f"ghest/*/{tail}" for tail in ("schema", "config", "calibration", "last", "gh/**"))
+"""What may be asked for."""
+
 _HEARD = ("gh/**", "health", "events", "@adv/**")
 _CALIBRATE = ("ghest/*/calibrate/**",)
 
@@ -72,7 +74,7 @@ def access_control(access: AccessList) -> dict[str, Any]:
     A station behind a router sees the router's name only; so a router may pass on what an operator may, and tells therapy
     software and operators apart itself.
     """
-    heard, asked = _keys(*_HEARD), _keys(*_ASKED)
+    heard, asked = _keys(*_HEARD), [*ASKED_KEYS]
     alive = _keys("alive")
     everything = [*heard, *asked, *alive]
     rules = [

@@ -12,7 +12,7 @@ from typing import Any, Literal
 import zenoh
 
 from ghest_rt.errors import BadInputError, GhestError
-from ghest_rt.security.access import access_control
+from ghest_rt.security.access import ASKED_KEYS, access_control
 from ghest_rt.security.endpoints import split_endpoint, stays_here
 from ghest_rt.security.identity import Identity
 from ghest_rt.security.roles import SERVER_ROLES
@@ -25,6 +25,7 @@ _MAX_MESSAGE_BYTES = 1_000_000  # Zenoh's default lets a peer make us collect 1 
 _MAX_SESSIONS = 64
 _MAX_PENDING = 16
 _OPEN_TIMEOUT_MS = 5_000
+_ASKED_MOST_HZ = 200.0  # each answer takes the interpreter's lock, which the loop needs, too
 
 
 def open_session(
@@ -100,6 +101,8 @@ def _secured(identity: Identity) -> dict[str, Any]:
     settings: dict[str, Any] = {"transport/link/protocols": ["tls"], "transport/link/tls": tls}
     if identity.access is not None:
         settings["access_control"] = access_control(identity.access)
+        rules = [{"key_expr": key, "freq": _ASKED_MOST_HZ} for key in ASKED_KEYS]
+        settings["downsampling"] = [{"flows": ["ingress"], "messages": ["query"], "rules": rules}]
     return settings
 
 

@@ -11,11 +11,18 @@ from ghest_rt.security.identity import CA_FILE, CERTIFICATE_FILE, KEY_FILE
 
 
 def open_raw(
-    connect: Sequence[str] = (), listen: Sequence[str] = (), identity: Path | None = None, ca: Path | None = None
+    connect: Sequence[str] = (),
+    listen: Sequence[str] = (),
+    identity: Path | None = None,
+    ca: Path | None = None,
+    mode: str = "peer",
 ) -> zenoh.Session:
-    """Open a session with an identity's files unchecked, or with a CA alone, or without TLS."""
+    """Open a session with an identity's files unchecked, or with a CA alone, or without TLS.
+
+    A peer sends only what the other side says it wants; a client (mode) sends everything.
+    """
     settings: dict[str, Any] = {
-        "mode": "peer",
+        "mode": mode,
         "listen/endpoints": list(listen),
         "connect/endpoints": list(connect),
         "connect/exit_on_failure": False,
