@@ -9,7 +9,7 @@ from typing import Any
 
 from rich.console import Console
 
-from benchmarks import bound, encoder_path, filter_tick, footprint, imaging, loop, pose, recording, throughput, tick
+from benchmarks import bound, encoder_path, filter_tick, flood, footprint, imaging, loop, pose, recording, throughput, tick
 from benchmarks.plot import draw
 
 _OUT = Path(__file__).resolve().parents[1] / "out" / "benchmarks"
@@ -21,6 +21,7 @@ _BENCHMARKS: dict[str, Callable[[bool], dict[str, Any]]] = {
     "filter": filter_tick.run,
     "throughput": throughput.run,
     "loop": loop.run,
+    "flood": flood.run,
     "memory": loop.memory,
     "footprint": footprint.run,
     "encoders": encoder_path.run,
