@@ -1,11 +1,15 @@
 """Options that the studies share."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ghest_rt.cli.options import Movement
+from ghest_rt.cli.options import Method, Movement
+from ghest_rt.errors import BadInputError
+
+if TYPE_CHECKING:
+    from ghest_rt.estimation.pipeline import Method as MethodName
 
 _MOVEMENTS = "|".join(Movement)
 
@@ -18,6 +22,10 @@ Movements = Annotated[
         case_sensitive=False,
         metavar=_MOVEMENTS,
     ),
+]
+Methods = Annotated[
+    list[Method] | None,
+    typer.Option("--method", help="Only this method; again for more. By default paper, refined and fused", show_default=False),
 ]
 Motions = Annotated[
     list[Path] | None,
@@ -54,3 +62,16 @@ Quick = Annotated[bool, typer.Option("--quick", metavar="", help="A small versio
 Json = Annotated[
     bool, typer.Option("--json", metavar="", help="Print one JSON document on standard output and nothing else there")
 ]
+
+
+def chosen_methods(methods: list[Method] | None) -> "tuple[MethodName, ...]":
+    """Return the methods to be judged.
+
+    Raises:
+        BadInputError: One of them looks for other markers.
+    """
+    from ghest_rt.studies.movements import METHODS
+
+    if Method.ARUCO in (methods or ()):
+        raise BadInputError("--method aruco: needs other markers in the scene; `ghest-rt study compare` has it")
+    return tuple(dict.fromkeys(method.value for method in methods)) if methods else METHODS

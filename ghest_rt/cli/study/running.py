@@ -1,7 +1,7 @@
 """What every study does on the command line: check the installation, choose where to run, show progress."""
 
 import importlib.util
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -53,3 +53,13 @@ def shown_progress(title: str) -> Iterator[Callable[[float, float], None]]:
     with Progress(*columns, console=console, disable=not console.is_terminal, transient=True, speed_estimate_period=600) as bar:
         task = bar.add_task(title, total=None)
         yield lambda done, total: bar.update(task, completed=done, total=total)
+
+
+def show_checks(console: Console, checks: Sequence[Mapping[str, object]]) -> None:
+    """Print the paper's statements with their verdicts."""
+    for check in checks:
+        verdict = "[green]holds[/]" if check["holds"] else "[yellow]does not hold[/]"
+        console.print(f"{verdict}: ", end="")
+        console.print(str(check["name"]), markup=False, highlight=False)
+        console.print(f"  {check['evidence']}", markup=False, highlight=False, style="dim")
+        console.print(f"  {check['explanation']}", markup=False, highlight=False, style="dim")

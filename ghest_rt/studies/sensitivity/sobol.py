@@ -9,6 +9,7 @@ from typing import Any, cast
 
 import numpy as np
 
+from ghest_rt.errors import BadInputError
 from ghest_rt.geometry.so3 import Array
 from ghest_rt.studies.engine.run import Executor, Progress, run_tasks
 from ghest_rt.studies.engine.store import ResultStore
@@ -31,6 +32,16 @@ _OUTPUTS = ("position_m", "orientation_deg")
 def sobol_parameters() -> list[Parameter]:
     """Return the parameters that vary."""
     return [p for p in (*paper_parameters(), *further_parameters()) if p.group in RANGES]
+
+
+def check_samples(samples: int) -> None:
+    """Refuse a number of base samples that Saltelli's sampling cannot use.
+
+    Raises:
+        BadInputError: It is not a power of two.
+    """
+    if samples < 1 or samples & (samples - 1):
+        raise BadInputError(f"--sobol-samples {samples}: give a power of two, such as 256")
 
 
 def run_sobol(

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any, Literal, cast
 
 from ghest_rt.estimation.pipeline import Method
-from ghest_rt.studies.engine.run import Executor, Progress, run_tasks
+from ghest_rt.studies.engine.run import Executor, Progress, run_tasks, spent_cpu_s
 from ghest_rt.studies.engine.store import ResultStore
 from ghest_rt.studies.engine.task import Task
 from ghest_rt.studies.movements import METHODS, Movements, frames_of
@@ -65,8 +65,8 @@ class _Case:
 
 def run_sensitivity(
     plan: SensitivityPlan, store: ResultStore, executor: Executor, progress: Progress | None = None
-) -> list[Row]:
-    """Run what is missing of an analysis and return its rows.
+) -> tuple[list[Row], float]:
+    """Run what is missing of an analysis; return its rows and the processor time spent on it, seconds.
 
     Returns:
         One row per movement, method, parameter and amount: `rms` and valid fraction, and the relative sensitivities of
@@ -77,10 +77,11 @@ def run_sensitivity(
         GhestError: Tasks failed; the others are kept.
     """
     cases = _cases(plan)
-    results = run_tasks([case.task for case in cases], store, executor, progress)
+    tasks = [case.task for case in cases]
+    results = run_tasks(tasks, store, executor, progress)
     rows = [_row(case, method, result) for case, result in zip(cases, results, strict=True) for method in plan.methods]
     _add_sensitivities(rows)
-    return rows
+    return rows, spent_cpu_s(tasks, store)
 
 
 def _cases(plan: SensitivityPlan) -> list[_Case]:

@@ -13,6 +13,10 @@ QUANTITIES = ("m0_m", "m1_m", "position_m", "orientation_deg")
 """Position errors of markers m0 and m1 in E, position and orientation error of the arm in the m0 frame."""
 
 
+STATISTICS = ("rms", "sd", "mean", "max", "whislo", "q1", "med", "q3", "whishi")
+"""What is told of each of them."""
+
+
 def error_statistics(estimates: Iterable[GhEstimate], truth: Sequence[TruthSample]) -> dict[str, object]:
     """Return the statistics of a run's errors.
 

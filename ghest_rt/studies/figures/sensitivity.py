@@ -1,0 +1,189 @@
+"""Figures 14 to 17: errors and relative sensitivities as markers shift; and what goes beyond them."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, cast
+
+from ghest_rt.studies.figures.style import METHOD_COLORS, PARAMETER_STYLES, new_figure, save_figure
+from ghest_rt.studies.paper_values import MEAN_RMSE_20_MM_DEG, PARAMETERS
+
+Row = dict[str, object]
+
+FIGURES = {"SAbAd": "14", "SFE": "15", "SIR": "16", "COMB": "17"}
+"""The paper's figure of each movement."""
+
+_PANELS = (
+    ("position_m_rms", "(a) position error of the arm", "error (mm)", 1e3),
+    ("orientation_deg_rms", "(b) orientation error of the arm", "error (°)", 1.0),
+    ("S_position", "(c) relative sensitivity, position", "S (dimensionless)", 1.0),
+    ("S_orientation", "(d) relative sensitivity, orientation", "S (dimensionless)", 1.0),
+)
+
+
+def save_all(rows: Sequence[Row], indices: Sequence[Row], folder: Path) -> list[Path]:
+    """Write every figure of an analysis; return the paths.
+
+    Args:
+        rows: Rows of the analysis.
+        indices: Its Sobol indices; may be empty.
+        folder: Where they go.
+    """
+    movements, methods = (list(dict.fromkeys(cast(str, r[column]) for r in rows)) for column in ("movement", "method"))
+    paths = save_figure(draw_drift_by_method(rows), folder, "drift_by_method")
+    for movement in movements:
+        number = FIGURES.get(movement, "")
+        for method in methods:
+            paths += save_figure(draw_figure_14(rows, movement, method), folder, f"figure{number}_{movement}_{method}")
+    if any(r["group"] != "shift" for r in rows):
+        paths += save_figure(draw_further(rows), folder, "further")
+    for movement in dict.fromkeys(cast(str, r["movement"]) for r in indices):
+        paths += save_figure(draw_sobol(indices, movement), folder, f"sobol_{movement}")
+    return paths
+
+
+def draw_figure_14(rows: Sequence[Row], movement: str, method: str) -> Any:
+    """Return the figure of one movement (14 SAbAd, 15 SFE, 16 SIR, 17 COMB) in the paper's four panels.
+
+    Args:
+        rows: Rows of a sensitivity analysis.
+        movement: Which movement.
+        method: Which method.
+    """
+    chosen = [r for r in rows if (r["group"], r["movement"], r["method"]) == ("shift", movement, method)]
+    figure = new_figure(7.2, 5.6)
+    for axes, (column, title, label, scale) in zip(figure.subplots(2, 2).flat, _PANELS, strict=True):
+        for name, (marker, axis) in PARAMETERS.items():
+            color, line, symbol = PARAMETER_STYLES[name]
+            curve = [r for r in chosen if r["parameter"] == name and r[column] is not None]
+            axes.plot(
+                [1e3 * cast(float, r["amount"]) for r in curve],
+                [scale * cast(float, r[column]) for r in curve],
+                color=color,
+                linestyle=line,
+                marker=symbol,
+                markersize=3.5,
+                linewidth=1.2,
+                label=f"{name}: {marker} along {axis}",
+            )
+        if column.startswith("S_"):
+            axes.axhline(1.0, color="0.4", linewidth=0.8, linestyle=":")
+        axes.set_title(title)
+        axes.set_xlabel("translation of the marker (mm)")
+        axes.set_ylabel(label)
+    handles, labels = axes.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=3, frameon=False)
+    figure.suptitle(f"{movement}, method {method}", fontsize=10)
+    return figure
+
+
+def draw_drift_by_method(rows: Sequence[Row]) -> Any:
+    """Return the arm's orientation and position error against marker translation, method by method.
+
+    The line is the mean over movements and q1 to q6, the band reaches from the least to the greatest of them.
+    """
+    shifts = [r for r in rows if r["group"] == "shift"]
+    methods = list(dict.fromkeys(cast(str, r["method"]) for r in shifts))
+    amounts = sorted({cast(float, r["amount"]) for r in shifts})
+    figure = new_figure(7.2, 3.3)
+    panels = figure.subplots(1, 2)
+    for axes, (column, title, label, scale) in zip(panels, _PANELS[1::-1], strict=True):
+        for method in methods:
+            groups = [
+                [
+                    scale * cast(float, r[column])
+                    for r in shifts
+                    if r["method"] == method and r["amount"] == amount and r[column] is not None
+                ]
+                for amount in amounts
+            ]
+            x = [1e3 * amount for amount, values in zip(amounts, groups, strict=True) if values]
+            known = [values for values in groups if values]
+            color = METHOD_COLORS[method]
+            axes.fill_between(x, [min(v) for v in known], [max(v) for v in known], color=color, alpha=0.15, linewidth=0)
+            axes.plot(x, [sum(v) / len(v) for v in known], color=color, marker="o", markersize=3, label=method)
+        axes.set_title(title.partition(") ")[2])
+        axes.set_xlabel("translation of the marker (mm)")
+        axes.set_ylabel(label)
+        axes.set_ylim(bottom=0.0)
+    panels[0].plot(
+        20.0, MEAN_RMSE_20_MM_DEG, marker="*", markersize=11, color="black", linestyle="none", label="the paper's 3.6°"
+    )
+    handles, labels = panels[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=len(labels), frameon=False)
+    return figure
+
+
+_GROUPS = {
+    "turn": "markers turned on the body",
+    "mount_turn": "camera mounts turned",
+    "mount_shift": "camera mounts displaced",
+    "encoder": "encoder bias",
+    "both": "both markers displaced",
+}
+
+
+def draw_further(rows: Sequence[Row]) -> Any:
+    """Return the arm's orientation error under what the paper leaves out, at the largest amount, mean over movements."""
+    groups = [name for name in _GROUPS if any(r["group"] == name for r in rows)]
+    methods = list(dict.fromkeys(cast(str, r["method"]) for r in rows))
+    names = {g: list(dict.fromkeys(cast(str, r["parameter"]) for r in rows if r["group"] == g)) for g in groups}
+    figure = new_figure(7.2, 1.2 + 0.17 * sum(len(several) + 1 for several in names.values()))
+    panels = figure.subplots(
+        len(groups), 1, sharex=True, squeeze=False, gridspec_kw={"height_ratios": [len(names[g]) for g in groups]}
+    )
+    height = 0.8 / len(methods)
+    for axes, group in zip(panels[:, 0], groups, strict=True):
+        of_group = [r for r in rows if r["group"] == group]
+        largest = max(cast(float, r["amount"]) for r in of_group)
+        unit = f"{largest:g}°" if of_group[0]["unit"] == "deg" else f"{1e3 * largest:g} mm"
+        for index, method in enumerate(methods):
+            means = []
+            for name in names[group]:
+                values = [
+                    cast(float, r["orientation_deg_rms"])
+                    for r in of_group
+                    if (r["parameter"], r["method"], r["amount"]) == (name, method, largest)
+                    and r["orientation_deg_rms"] is not None
+                ]
+                means.append(sum(values) / len(values) if values else float("nan"))
+            places = [k + (index - (len(methods) - 1) / 2) * height for k in range(len(means))]
+            axes.barh(places, means, 0.9 * height, color=METHOD_COLORS[method], label=method)
+        axes.set_yticks(range(len(names[group])), [name.removeprefix(f"{group} ") for name in names[group]])
+        axes.invert_yaxis()
+        axes.grid(axis="y", visible=False)
+        axes.set_title(f"{_GROUPS[group]}, {unit} each", loc="left")
+    panels[-1, 0].set_xlabel("orientation error of the arm (°), mean of the movements' RMS")
+    handles, labels = panels[0, 0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=len(labels), frameon=False)
+    return figure
+
+
+def draw_sobol(rows: Sequence[Row], movement: str) -> Any:
+    """Return the Sobol indices of one movement, position and orientation side by side, with 95 % confidence intervals."""
+    chosen = [r for r in rows if r["movement"] == movement]
+    figure = new_figure(7.2, 5.8)
+    panels = figure.subplots(1, 2, sharey=True)
+    for axes, (output, title) in zip(
+        panels, (("position_m", "position error"), ("orientation_deg", "orientation error")), strict=True
+    ):
+        of_output = [r for r in chosen if r["output"] == output]
+        places = range(len(of_output))
+        for shift, column, color, label in ((-0.2, "S1", "#56B4E9", "first order"), (0.2, "ST", "#D55E00", "total")):
+            axes.barh(
+                [k + shift for k in places],
+                [cast(float, r[column]) for r in of_output],
+                0.38,
+                xerr=[cast(float, r[f"{column}_conf"]) for r in of_output],
+                error_kw={"elinewidth": 0.7},
+                color=color,
+                label=label,
+            )
+        axes.set_yticks(places, [cast(str, r["parameter"]).replace("_", " ") for r in of_output])
+        axes.set_title(f"{title}, {movement}")
+        axes.set_xlabel("share of the variance (dimensionless)")
+        axes.set_xlim(left=0.0)
+        axes.grid(axis="y", visible=False)
+    panels[0].invert_yaxis()
+    handles, labels = panels[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=2, frameon=False)
+    return figure
