@@ -53,8 +53,9 @@ def _common() -> str:
         path = root / name
         for file in sorted(path.rglob("*.py")) if path.is_dir() else [path]:
             digest.update(file.relative_to(root).as_posix().encode() + b"\0" + file.read_bytes())
-    for file in sorted(shipped_config_dir().iterdir()):
-        digest.update(file.name.encode() + b"\0" + file.read_bytes())
+    stations = shipped_config_dir()
+    for file in sorted(path for path in stations.rglob("*") if path.suffix in {".toml", ".urdf"}):
+        digest.update(file.relative_to(stations).as_posix().encode() + b"\0" + file.read_bytes())
     return digest.hexdigest()
 
 

@@ -47,8 +47,8 @@ def _absolute(rows: Sequence[Row], amount: float, column: str, stronger: str) ->
         verdicts.append(max(strong) > max(weak))
         means = f"{scale * sum(strong) / len(strong):.2f}, {scale * sum(weak) / len(weak):.2f}"
         figures.append(
-            f"{movement}: worst axis of {stronger} {scale * max(strong):.2f} {unit}, of {weaker} {scale * max(weak):.2f} {unit} "
-            f"(means of the axes {means})"
+            f"{movement}: worst axis of {stronger} {scale * max(strong):.2f} {unit}, "
+            f"of {weaker} {scale * max(weak):.2f} {unit} (means of the axes {means})"
         )
     if what == "position":
         why = "What differs between them is the method's own error, a millimetre at most, which adds or cancels."
