@@ -11,11 +11,11 @@ from ghest_rt.cli.console import print_json, unused_in_words
 from ghest_rt.cli.options import Method
 from ghest_rt.cli.table_file import Row, row_of, write_table, writer_for
 from ghest_rt.config.load import load_station
+from ghest_rt.estimation.angles import signs_of
 from ghest_rt.estimation.offline import estimate_events
 from ghest_rt.estimation.pipeline import Pipeline
 from ghest_rt.messages.results import Status
 from ghest_rt.recording.reader import Recording
-from ghest_rt.service.compose import signs_of
 
 _log = logging.getLogger(__name__)
 

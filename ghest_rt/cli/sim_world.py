@@ -4,8 +4,8 @@ from ghest_rt.cli.scoreboard import Scoreboard
 from ghest_rt.config.load import LoadedStation
 from ghest_rt.messages.published import Event, GhAngles, Health
 from ghest_rt.messages.results import GhEstimate
-from ghest_rt.simulation.command import SimulateOptions, build_world
-from ghest_rt.simulation.world import World
+from ghest_rt.simulation.command import SimulateOptions, stage_world
+from ghest_rt.simulation.staged import StagedWorld
 
 
 class LiveWorld:
@@ -22,7 +22,7 @@ class LiveWorld:
             BadInputError: An option cannot be used.
             GhestError: The exoskeleton cannot follow the movement.
         """
-        self._world: World = build_world(options)
+        self._world: StagedWorld = stage_world(options)
         self._start_ns = start_ns
         self.scoreboard = Scoreboard()
         self.scoreboard.set_time_axis(self.to_world_ns)

@@ -6,6 +6,7 @@ from typing import Literal
 
 import numpy as np
 
+from ghest_rt.config.station import Joint
 from ghest_rt.geometry.so3 import Array, rot_x, rot_y, rot_z
 
 Arm = Literal["right", "left"]
@@ -53,6 +54,11 @@ class AngleSigns:
 
 GH_SIGNS = AngleSigns()
 """Of the glenohumeral joint."""
+
+
+def signs_of(joint: Joint) -> AngleSigns:
+    """Return the signs that the station file gives the angles of its joint."""
+    return AngleSigns(joint.flexion_sign, joint.abduction_sign, joint.rotation_sign)
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 
 from ghest_rt.config.station import Joint
-from ghest_rt.estimation.angles import GH_SIGNS, AngleSigns, Arm, clinical, euler_yxz
+from ghest_rt.estimation.angles import GH_SIGNS, AngleSigns, Arm, clinical, euler_yxz, signs_of
 from ghest_rt.estimation.isb import isb_yxy
 from ghest_rt.estimation.swing_twist import swing_twist
 from ghest_rt.estimation.uncertainty import euler_sigma_rad
@@ -24,11 +24,6 @@ def sigma_of(gh_from_arm: Array, covariance: Array | None) -> Clinical | None:
         return None
     a, b, g = (math.degrees(sigma) for sigma in euler_sigma_rad(gh_from_arm, covariance))
     return Clinical(flexion=a, abduction=b, rotation=g)
-
-
-def signs_of(joint: Joint) -> AngleSigns:
-    """Return the signs that the station file gives the angles of its joint."""
-    return AngleSigns(joint.flexion_sign, joint.abduction_sign, joint.rotation_sign)
 
 
 def clinical_deg(gh_from_arm: Array, arm: Arm, signs: AngleSigns = GH_SIGNS) -> Clinical:

@@ -19,14 +19,17 @@ from ghest_rt.simulation.disturbances import MarkerMove, SoftTissueName
 from ghest_rt.simulation.faults import DeviceFault, FaultyDevices
 from ghest_rt.simulation.fitting import fit_station, without_depth
 from ghest_rt.simulation.imaging import Light
+from ghest_rt.simulation.knee import DURATION_S, JOINT, KneeMotion, KneeStage
 from ghest_rt.simulation.opensim_file import read_motion_table
 from ghest_rt.simulation.opensim_motion import OpenSimMotion
 from ghest_rt.simulation.optics import Imaging
 from ghest_rt.simulation.posture import Motion
 from ghest_rt.simulation.sensors import find_sensors
 from ghest_rt.simulation.soft_tissue import find_soft_tissue
+from ghest_rt.simulation.staged import StagedWorld
 from ghest_rt.simulation.texture import MarkerTexture
 from ghest_rt.simulation.therapy import TherapyMotion, find_movement
+from ghest_rt.simulation.timeline import Timeline
 from ghest_rt.simulation.world import World
 
 _LOOK_AHEAD = 6
@@ -104,6 +107,20 @@ class SimulationSummary:
     size_bytes: int
 
 
+def stage_world(options: SimulateOptions) -> StagedWorld:
+    """Set up what `options` describe (`out` and `faults` are not used): the clinic, or the knee if the station measures one.
+
+    Raises:
+        BadInputError: An option, the station file or the motion file cannot be used.
+        GhestError: The exoskeleton cannot follow the movement.
+    """
+    if options.station is not None:
+        station = load_station(options.station)
+        if station.config.joint.name == JOINT:
+            return _knee_world(options, station)
+    return build_world(options)
+
+
 def build_world(options: SimulateOptions) -> World:
     """Set up the simulated clinic that `options` describe (`out` and `faults` are not used).
 
@@ -140,6 +157,25 @@ def build_world(options: SimulateOptions) -> World:
     )
 
 
+def _knee_world(options: SimulateOptions, station: LoadedStation) -> StagedWorld:
+    """Set up the example of another limb, config/examples/knee."""
+    if options.marker_moves or options.soft_tissue != "none" or options.motion is not None:
+        raise BadInputError("the simulated knee has one movement, no marker shifts and no soft tissue; leave these options out")
+    if options.color_only:
+        station = without_depth(station)
+    return StagedWorld(
+        station,
+        KneeStage(station, KneeMotion.from_seed(options.seed)),
+        find_sensors(options.sensor),
+        Timeline(DURATION_S if options.duration_s is None else min(options.duration_s, DURATION_S)),
+        motion_name=JOINT,
+        seed=options.seed,
+        texture=options.marker,
+        light=Light(options.brightness, options.white_balance),
+        imaging=options.imaging,
+    )
+
+
 def simulate(options: SimulateOptions, progress: Callable[[float], None]) -> SimulationSummary:
     """Record a simulated session. `progress` hears the fraction done, 0-1, now and then.
 
@@ -147,12 +183,12 @@ def simulate(options: SimulateOptions, progress: Callable[[float], None]) -> Sim
         BadInputError: An option, the station file, the motion file or the output path cannot be used.
         GhestError: The exoskeleton cannot follow the movement.
     """
-    world = build_world(options)
+    world = stage_world(options)
     devices = FaultyDevices(options.faults, world.camera_names, options.seed)
-    name = _motion_name(options)
+    name = world.motion_name
     facts = {
         "created_by": f"ghest-rt {version('ghest-rt')}",
-        "command": _command(options),
+        "command": _command(options, name),
         "motion": name,
         "sensor": options.sensor,
         "seed": str(options.seed),
@@ -203,7 +239,7 @@ class _Delivery:
     arrival_ns: int
 
 
-def _deliveries(world: World, devices: FaultyDevices, camera: str) -> list[_Delivery]:
+def _deliveries(world: StagedWorld, devices: FaultyDevices, camera: str) -> list[_Delivery]:
     """Return the frames that a camera delivers, in their order: behind a late one the next wait."""
     deliveries: list[_Delivery] = []
     latest_ns = 0
@@ -215,7 +251,7 @@ def _deliveries(world: World, devices: FaultyDevices, camera: str) -> list[_Deli
     return deliveries
 
 
-def _events(world: World, deliveries: dict[str, list[_Delivery]]) -> list[tuple[int, str, int]]:
+def _events(world: StagedWorld, deliveries: dict[str, list[_Delivery]]) -> list[tuple[int, str, int]]:
     """Return (arrival time, source, number) of everything to be written, in order of arrival."""
     events = [(t_ns, "truth", k) for k, t_ns in enumerate(world.truth_times_ns)]
     events += [(world.encoder_arrival_ns(k), "encoders", k) for k in range(world.encoder_count)]
@@ -225,7 +261,7 @@ def _events(world: World, deliveries: dict[str, list[_Delivery]]) -> list[tuple[
 
 
 def _render_ahead(
-    world: World, devices: FaultyDevices, camera: str, deliveries: Sequence[_Delivery], pool: ThreadPoolExecutor
+    world: StagedWorld, devices: FaultyDevices, camera: str, deliveries: Sequence[_Delivery], pool: ThreadPoolExecutor
 ) -> Iterator[RgbdFrame]:
     """Yield a camera's frames in order, one after another on the pool, a few ahead of the writer."""
 
@@ -277,19 +313,15 @@ def _motion(options: SimulateOptions) -> Motion:
     raise BadInputError("give either a movement (--movement) or a motion file (--motion)")
 
 
-def _motion_name(options: SimulateOptions) -> str:
-    if options.motion is not None:
-        return options.motion.stem
-    return find_movement(options.movement or "").name
-
-
-def _command(options: SimulateOptions) -> str:
+def _command(options: SimulateOptions, motion_name: str) -> str:
     """Return the command that makes this recording again, without folders, so that it does not depend on where it ran."""
     words = ["ghest-rt", "simulate"]
     if options.motion is not None:
         words += ["--motion", options.motion.name]
-    else:
-        words += ["--movement", _motion_name(options)]
+    elif options.movement is not None:
+        words += ["--movement", motion_name]
+    if options.station is not None:
+        words += ["--station", options.station.name]
     words += ["--sensor", options.sensor, "--seed", str(options.seed)]
     if options.duration_s is not None:
         words += ["--duration", f"{options.duration_s:g}"]

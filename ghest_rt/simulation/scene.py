@@ -115,7 +115,7 @@ def build_scene(station: StationConfig, urdf_text: str, source: str, body: Anato
     )
     spec = exoskeleton_spec(urdf_text, source)
     exoskeleton_joints = [joint.name for joint in spec.joints]
-    _add_room(spec)
+    add_room(spec)
     builder = _PatientBuilder(spec, body, side)
     builder.add()
     for marker, bone, bone_from_marker in (("m0", "scapula", scapula_from_m0), ("m1", "humerus", humerus_from_m1)):
@@ -137,7 +137,7 @@ def _mount(model: mujoco.MjModel, marker: str) -> tuple[int, int]:
     return int(model.body(f"{marker}_mount").id), int(model.joint(f"{marker}_slide_x").qposadr[0])
 
 
-def _add_room(spec: mujoco.MjSpec) -> None:
+def add_room(spec: mujoco.MjSpec) -> None:
     """Add floor and walls, a few metres away."""
     planes = (
         ((-1.2, 0.0, 0.0), (1.0, 0.0, 0.0), (0.48, 0.44, 0.40)),
@@ -148,6 +148,25 @@ def _add_room(spec: mujoco.MjSpec) -> None:
     )
     for position, normal, rgb in planes:
         spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, pos=position, zaxis=normal, size=(0, 0, 1), rgba=(*rgb, 1.0))
+
+
+def add_plate(body: mujoco.MjsBody, marker: str, body_from_marker: Array, plate_m: float, stalk_end: Array) -> None:
+    """Add a marker plate (front face at the marker's origin) and its stalk, which ends at (3,) `stalk_end` of the body."""
+    R, p = body_from_marker[:3, :3], body_from_marker[:3, 3]
+    half = _PLATE_THICKNESS_M / 2
+    body.add_geom(
+        name=f"{marker}_plate",
+        type=mujoco.mjtGeom.mjGEOM_BOX,
+        pos=p - half * R[:, 2],
+        quat=quat_wxyz_from_matrix(R),
+        size=(plate_m / 2, plate_m / 2, half),
+        rgba=(*_WHITE, 1.0),
+        group=PLATE_GROUPS[marker],
+    )
+    start = p - (half * 2 + 0.006) * R[:, 2]
+    body.add_geom(
+        type=mujoco.mjtGeom.mjGEOM_CAPSULE, fromto=(*start, *stalk_end), size=(0.006, 0, 0), rgba=(*_STALK, 1.0), group=1
+    )
 
 
 class _PatientBuilder:
@@ -200,20 +219,7 @@ class _PatientBuilder:
             body = self._add_mount(body, marker, body_from_marker)
             end = R.T @ (end - p)
             R, p = np.eye(3), np.zeros(3)
-        half = _PLATE_THICKNESS_M / 2
-        body.add_geom(
-            name=f"{marker}_plate",
-            type=mujoco.mjtGeom.mjGEOM_BOX,
-            pos=p - half * R[:, 2],
-            quat=quat_wxyz_from_matrix(R),
-            size=(plate_m / 2, plate_m / 2, half),
-            rgba=(*_WHITE, 1.0),
-            group=PLATE_GROUPS[marker],
-        )
-        start = p - (half * 2 + 0.006) * R[:, 2]
-        body.add_geom(
-            type=mujoco.mjtGeom.mjGEOM_CAPSULE, fromto=(*start, *end), size=(0.006, 0, 0), rgba=(*_STALK, 1.0), group=1
-        )
+        add_plate(body, marker, transform(R, p), plate_m, end)
 
     @staticmethod
     def _add_mount(bone: mujoco.MjsBody, marker: str, bone_from_marker: Array) -> mujoco.MjsBody:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ghest_drivers.samples import RgbdFrame
 from ghest_rt.errors import BadInputError, GhestError
-from ghest_rt.estimation.angles import Arm, clinical, euler_yxz
+from ghest_rt.estimation.angles import AngleSigns, Arm, clinical, euler_yxz, signs_of
 from ghest_rt.estimation.pipeline import Method, Pipeline
 from ghest_rt.messages.results import MarkerObservation
 from ghest_rt.recording.reader import Recording
@@ -97,27 +97,28 @@ def _draw_axes(
 
 
 def _draw_angles(axes: Any, run: JudgedRun) -> None:
-    arm = run.recording.station.config.station.arm
+    config = run.recording.station.config
+    arm, signs = config.station.arm, signs_of(config.joint)
     t_0_ns = run.estimates[0].t_sample_ns if run.estimates else 0
     estimated, true = [], []
     for estimate in run.estimates:
         seconds = (estimate.t_sample_ns - t_0_ns) * 1e-9
         truth = run.truth.at(estimate.t_sample_ns)
-        estimated.append((seconds, *_angles_deg(estimate.gh_from_arm, arm)))
-        true.append((seconds, *_angles_deg(truth.gh_from_arm if truth is not None else None, arm)))
+        estimated.append((seconds, *_angles_deg(estimate.gh_from_arm, arm, signs)))
+        true.append((seconds, *_angles_deg(truth.gh_from_arm if truth is not None else None, arm, signs)))
     for column, (name, color) in enumerate(_COLORS.items(), start=1):
         axes.plot(*_columns(true, column), color="0.78", linewidth=4.5, label="truth" if column == len(_COLORS) else None)
         axes.plot(*_columns(estimated, column), color=color, linewidth=1.2, label=name)
-    axes.set_ylabel("GH angle (deg)")
+    axes.set_ylabel(f"{'GH' if config.joint.name == 'gh' else config.joint.name} angle (deg)")
     axes.legend(ncols=4, fontsize=9, loc="lower right", bbox_to_anchor=(1.0, 1.0), frameon=False)
     axes.tick_params(labelbottom=False)
     axes.grid(alpha=0.3)
 
 
-def _angles_deg(gh_from_arm: NDArray[np.float64] | None, arm: Arm) -> tuple[float, float, float]:
+def _angles_deg(gh_from_arm: NDArray[np.float64] | None, arm: Arm, signs: AngleSigns) -> tuple[float, float, float]:
     if gh_from_arm is None:
         return math.nan, math.nan, math.nan
-    angles = clinical(euler_yxz(gh_from_arm), arm)
+    angles = clinical(euler_yxz(gh_from_arm), arm, signs)
     return math.degrees(angles.flexion_rad), math.degrees(angles.abduction_rad), math.degrees(angles.rotation_rad)
 
 
