@@ -14,6 +14,7 @@ from ghest_rt.config.load import load_station
 from ghest_rt.config.shipped import shipped_config_dir
 from ghest_rt.messages.published import Event, EventKind, GhAngles
 from ghest_rt.messages.results import GhEstimate, Reason, Status
+from ghest_rt.security.identity import Identity
 from ghest_rt.security.session import open_session
 from ghest_rt.service.publisher import ZenohPublisher
 
@@ -64,14 +65,14 @@ class FakeStation:
         run_id: str = "a",
         endpoint: str = "tcp/127.0.0.1:0",
         router: str | None = None,
-        lossless: bool = False,
+        identity: Identity | None = None,
     ) -> None:
         config = load_station(shipped_config_dir() / "station-sim.toml").config
         config = config.model_copy(update={"station": config.station.model_copy(update={"id": station})})
         listen, connect = ((endpoint,), ()) if router is None else ((), (router,))
-        self.session, endpoints = open_session(listen, connect)
+        self.session, endpoints = open_session(listen, connect, identity)
         self.endpoint = endpoints[0] if router is None else router
-        self.publisher = ZenohPublisher(self.session, config, lossless)
+        self.publisher = ZenohPublisher(self.session, config)
         self.run_id = run_id
         self.next_seq = 0
         self._open = True
@@ -160,7 +161,7 @@ class Network:
     def __init__(self, endpoint: str) -> None:
         self._target = ("127.0.0.1", int(endpoint.rpartition(":")[2]))
         self._listener = socket.create_server(("127.0.0.1", 0))
-        self.endpoint = f"tcp/127.0.0.1:{self._listener.getsockname()[1]}"
+        self.endpoint = f"{endpoint.partition('/')[0]}/127.0.0.1:{self._listener.getsockname()[1]}"
         self._flowing = threading.Event()
         self._flowing.set()
         self._whole = True
