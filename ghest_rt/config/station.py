@@ -144,6 +144,14 @@ class Publisher(Strict):
     )
 
 
+class Recorder(Strict):
+    """What holds for every recording of this station."""
+
+    encrypt_to: tuple[str, ...] = Field(
+        default=(), max_length=20, description="Public keys (age1…) that recordings are sealed for: `ghest-rt recording-key`"
+    )
+
+
 class StationConfig(Strict):
     """The whole station file."""
 
@@ -159,6 +167,7 @@ class StationConfig(Strict):
     elbow: Elbow | None = None
     estimator: Estimator = Estimator()
     publisher: Publisher = Publisher()
+    recorder: Recorder = Recorder()
     metrics: Metrics = Metrics()
 
     @model_validator(mode="after")
