@@ -137,6 +137,16 @@ def record(
     duration_s: Annotated[
         float | None, typer.Option("--duration", min=0.1, metavar="SECONDS", help="Stop after this long", show_default=False)
     ] = None,
+    encrypt_to: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--encrypt-to", metavar="AGE1…", help="Seal the files for this public key; may be repeated", show_default=False
+        ),
+    ] = None,
+    subject: Annotated[
+        str | None,
+        typer.Option(metavar="PSEUDONYM", help="Of the patient, like P-0042, written into the files", show_default=False),
+    ] = None,
     movement: Annotated[
         Movement,
         typer.Option(help="What the patient of a simulated station does (Table 2)", case_sensitive=False, metavar=_MOVEMENTS),
@@ -148,7 +158,9 @@ def record(
     from ghest_rt.cli.recording import RecordOptions
     from ghest_rt.cli.run import RunOptions, run_station
 
-    recording = RecordOptions(out, part_mb * 1_000_000, round(part_min * 60e9), compress)
+    recording = RecordOptions(
+        out, part_mb * 1_000_000, round(part_min * 60e9), compress, tuple(encrypt_to or ()), subject
+    )
     run_station(RunOptions(station, method, listen, not no_publish, duration_s, as_json, movement, seed, recording))
 
 
@@ -340,6 +352,33 @@ def doctor(
     code = run_doctor(station, live_s, as_json)
     if code:
         raise typer.Exit(code)
+
+
+@app.command()
+def decrypt(
+    sealed: Annotated[
+        list[Path],
+        typer.Argument(metavar="RECORDING...", help="Sealed recordings (.age), or folders of them", show_default=False),
+    ],
+    key: Annotated[Path, typer.Option(metavar="FILE", help="Secret key", show_default=False)],
+    out: Annotated[
+        Path | None, typer.Option(metavar="FOLDER", help="Where to, if not beside them", show_default=False)
+    ] = None,
+) -> None:
+    """Open sealed recordings (needs the extra 'security')."""
+    from ghest_rt.cli.decrypt import decrypt as open_sealed
+
+    open_sealed(sealed, key, out)
+
+
+@app.command("recording-key")
+def recording_key(
+    out: Annotated[Path, typer.Option(metavar="FILE", help="Where the secret key goes", show_default=False)],
+) -> None:
+    """Make a pair of keys for sealed recordings (needs the extra 'security')."""
+    from ghest_rt.cli.decrypt import recording_key as make_key
+
+    make_key(out)
 
 
 @app.command("install-service")
