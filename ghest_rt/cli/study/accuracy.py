@@ -86,8 +86,8 @@ def _show(entries: list[dict[str, Any]], checks: list[dict[str, Any]], folder: P
         box=box.SIMPLE_HEAD,
         pad_edge=False,
     )
-    for column in ("sensor", "method", "movement"):
-        shown.add_column(column)
+    for column in ("sensor: method", "movement"):
+        shown.add_column(column, no_wrap=True)
     for title in _TITLES.values():
         shown.add_column(title, justify="right", no_wrap=True)
     by_place: dict[tuple[str, str, str], dict[str, dict[str, Any]]] = {}
@@ -95,13 +95,13 @@ def _show(entries: list[dict[str, Any]], checks: list[dict[str, Any]], folder: P
         by_place.setdefault((e["sensor"], e["method"], e["movement"]), {})[e["quantity"]] = e
     reported: dict[str, dict[str, dict[str, Any]]] = {}
     for (sensor, method, movement), of in by_place.items():
-        shown.add_row(sensor, method, movement, *(_cell(of[q], q) for q in _TITLES))
+        shown.add_row(f"{sensor}: {method}", movement, *(_cell(of[q], q) for q in _TITLES))
         if any(e["paper_rms"] is not None for e in of.values()):
             reported[movement] = of
     if reported:
         shown.add_section()
     for movement, of in reported.items():
-        shown.add_row("the paper's", "as published", movement, *(_number(of[q]["paper_rms"], q) for q in _TITLES))
+        shown.add_row("as published", movement, *(_number(of[q]["paper_rms"], q) for q in _TITLES))
     console = Console()
     console.print(shown)
     show_checks(console, checks)
@@ -117,4 +117,4 @@ def _cell(entry: dict[str, Any], quantity: str) -> str:
 def _number(value: float | None, quantity: str) -> str:
     if value is None:
         return "-"
-    return f"{value if quantity.endswith('_deg') else 1e3 * value:.4f}"
+    return f"{value if quantity.endswith('_deg') else 1e3 * value:.3f}"
