@@ -3,6 +3,7 @@
 import asyncio
 import socket
 import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -74,6 +75,27 @@ async def test_garbage_between_frames_is_discarded_and_counted(pty_pair: PtyPair
     assert [(await link.read(1.0)).t_device_ns for _ in range(2)] == [1_000_000, 3_000_000]
     assert link.stats.rejected[Rejection.BAD_CHECKSUM] >= 1
     assert link.stats.lost == 1
+    await link.close()
+
+
+async def test_a_burst_of_old_samples_after_reopening_is_placed_in_the_past(
+    pty_pair: PtyPair, serial_settings: SerialSettings
+) -> None:
+    link = await opened(serial_settings)
+    start_ns = time.monotonic_ns()
+    for seq in range(3):
+        pty_pair.send(frame(seq))
+        offset_ns = (await link.read(1.0)).t_capture_ns - seq * 1_000_000
+        await asyncio.sleep(0.001)
+    await link.close()
+    await link.open()
+    await asyncio.sleep(0.1)
+    for first in (10, 12):  # 10 .. 14 ms by the device's clock: what it had kept for us
+        pty_pair.send(frame(first) + frame(first + 1))
+        for seq in (first, first + 1):
+            sample = await link.read(1.0)
+            assert abs(sample.t_capture_ns - seq * 1_000_000 - offset_ns) < 5_000_000
+            assert sample.t_arrival_ns - start_ns > 100_000_000
     await link.close()
 
 

@@ -15,12 +15,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 from ghest_drivers.hardware.encoders.binary_frame import documented_format
-from tests.hil.injection import Injected, hil_folder
+from tests.hil.injection import DeviceClock, Injected, hil_folder
 from tests.hil.scene import Scene, read_scene
 
 PERIOD_NS = 15_600_000
 LATENCY_NS = 1_000_000
-CLOCK_STEP_NS = 7_000_000_000
 _CLOCK_START_NS = (1 << 32) * 1000 - 20_000_000_000  # the counter of microseconds wraps after 20 s
 
 Write = Callable[[bytes], None]
@@ -40,6 +39,7 @@ def talk(scene: Scene, injected: Injected, send: SendSample) -> None:
     """Send samples for ever."""
     seq = (time.monotonic_ns() - scene.epoch_ns) // PERIOD_NS
     jumped = 0
+    clock = DeviceClock(injected)
     while True:
         seq += 1
         t_ns = scene.epoch_ns + seq * PERIOD_NS
@@ -49,9 +49,7 @@ def talk(scene: Scene, injected: Injected, send: SendSample) -> None:
             continue
         jumped += 1000 if fault == "counter_jumps" and seq % 5 == 0 else 0
         t_device_ns = round((t_ns - scene.epoch_ns) * 0.99998) + _CLOCK_START_NS
-        if fault == "clock_step":
-            t_device_ns += CLOCK_STEP_NS
-        send(seq + jumped, t_device_ns, [math.degrees(angle) for angle in scene.joints_at(t_ns)], fault)
+        send(seq + jumped, t_device_ns + clock.off_ns(t_ns), [math.degrees(angle) for angle in scene.joints_at(t_ns)], fault)
 
 
 def serial_sender(joints: int, link: Path) -> SendSample:

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from ghest_drivers.errors import DeviceNotFound
-from tests.hil.injection import Injected
+from tests.hil.injection import DeviceClock, Injected
 from tests.hil.scene import FRAME_RATE_HZ, Scene, read_scene
 
 LATENCY_NS = 16_666_667  # mid-exposure to delivery: what the RealSense driver takes for granted
@@ -28,6 +28,7 @@ class CameraFeeder:
         self.scene: Scene = read_scene(folder)
         self._name = name
         self._injected = Injected(folder, name)
+        self.clock = DeviceClock(self._injected)
         self._random = random.Random(name)
         if self._injected.fault(time.monotonic_ns()) == "unplugged":
             raise DeviceNotFound(f"camera {name}: no such device")

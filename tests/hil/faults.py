@@ -9,13 +9,17 @@ import tempfile
 import time
 from collections import Counter
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
+from tests.hil.injection import Window
 from tests.hil.rig import FIXTURES, Rig, Sample, fixture_rig
 
 BOTH = ("realsense-serial", "oak-can")
 WRONG_DEG = 2.0  # an angle further off than this is not the truth of its instant
 _SETTLED = 20  # valid samples in a row
+_SILENCE_NS = 200_000_000  # a subscriber to whom nothing comes for so long knows that something is wrong
+_RATE_HZ = 66.6
 _RECOVERY_S = 15.0
 _MARKER = "<!-- table -->"
 
@@ -59,6 +63,9 @@ FAULTS = (
     _fault("encoders: checksum errors", "encoders", "crc_errors", "encoders_silent"),
     _fault("encoders: counter jumps", "encoders", "counter_jumps"),
     _fault("encoders: clock steps by 7 s and back", "encoders", "clock_step"),
+    _fault("encoders: clock slews by 500 ppm", "encoders", "clock_slew", seconds=2.0),
+    _fault("camera clock steps by 7 s and back (r0)", "r0", "clock_step", rigs=("realsense-serial",)),
+    _fault("camera clock slews by 500 ppm (r1)", "r1", "clock_slew", seconds=2.0, rigs=("realsense-serial",)),
     _fault("CAN: error frames only (bus-off)", "encoders", "bus_off", "encoders_silent", rigs=("oak-can",)),
 )
 
@@ -72,11 +79,14 @@ class Seen:
         fault: Which fault.
         samples: Samples published from its beginning to the recovery.
         states: How many had which status and reason.
-        detected_ms: From its beginning to the first sample that is not plainly valid; None if there was none.
-        recovered_ms: From its end to the first of the valid samples that follow one another; None: never.
+        detected_ms: From its beginning to the first sample that is not plainly valid, the withdrawal of the liveliness token,
+            or a silence of 0.2 s; None if there was none of it.
+        recovered_ms: From its end to the arrival of the first of the valid samples that follow one another; None: never.
+        lost: Slots of the grid without angles, from its beginning to the recovery.
+        longest_gap_ms: Longest time in which nothing arrived.
         stale: Samples called valid whose angles are not the truth of their instant.
         worst_deg: The largest error among the samples with angles.
-        missing: Samples that never came.
+        missing: Samples that were sent and never came.
     """
 
     rig: str
@@ -88,6 +98,8 @@ class Seen:
     stale: int
     worst_deg: float
     missing: int
+    lost: int
+    longest_gap_ms: float
 
     @property
     def reasons(self) -> set[str]:
@@ -105,31 +117,55 @@ def measure(rig: Rig, fault: Fault) -> Seen:
         raise RuntimeError(f"{rig.name}: not well before {fault.name}")
     window = rig.inject(fault.devices, fault.mode, fault.seconds)
     time.sleep(max((window.until_ns - time.monotonic_ns()) * 1e-9, 0.0))
+    return judge(rig, fault, window)
+
+
+def judge(rig: Rig, fault: Fault, window: Window) -> Seen:
+    """Wait until a rig is well again after a fault that has ended, and say what the subscriber saw."""
     well = rig.wait_valid(_SETTLED, _RECOVERY_S)
     seen = rig.subscriber.between(window.from_ns, time.monotonic_ns())
-    first_bad = next((sample for sample in seen if not sample.valid), None)
-    recovered_ns = _recovered_ns(seen, window.until_ns) if well else None
-    errors = [(sample.valid, _error_deg(rig, sample)) for sample in seen if sample.body["quaternion_wxyz"] is not None]
-    numbers = [sample.body["seq"] for sample in seen]
+    arrivals = [window.from_ns, *(sample.t_received_ns for sample in seen)]
+    gaps = [later - earlier for earlier, later in pairwise(arrivals)]
+    signs = [sample.t_received_ns for sample in seen if not sample.valid][:1]
+    signs += [t_ns for t_ns, is_there in rig.subscriber.tokens if not is_there and t_ns >= window.from_ns][:1]
+    signs += [arrivals[k] + _SILENCE_NS for k, gap in enumerate(gaps) if gap > _SILENCE_NS][:1]
+    recovered_ns = _recovered_ns(seen, gaps, window.until_ns) if well else None
+    until_ns = window.until_ns if recovered_ns is None else max(recovered_ns, window.until_ns)
+    with_angles = [sample for sample in seen if sample.body["quaternion_wxyz"] is not None]
+    errors = [(sample.valid, _error_deg(rig, sample)) for sample in with_angles]
+    slots = round((until_ns - window.from_ns) * 1e-9 * _RATE_HZ)
     return Seen(
         rig=rig.name,
         fault=fault,
         samples=len(seen),
         states=Counter((sample.body["status"], sample.body["reason"]) for sample in seen),
-        detected_ms=None if first_bad is None else (first_bad.body["t_publish_ns"] - window.from_ns) * 1e-6,
+        detected_ms=None if not signs else (min(signs) - window.from_ns) * 1e-6,
         recovered_ms=None if recovered_ns is None else max(recovered_ns - window.until_ns, 0) * 1e-6,
         stale=sum(valid and error > WRONG_DEG for valid, error in errors),
         worst_deg=max((error for _, error in errors), default=0.0),
-        missing=numbers[-1] - numbers[0] + 1 - len(numbers) if numbers else 0,
+        missing=_missing(seen),
+        lost=max(slots - sum(sample.t_received_ns <= until_ns for sample in with_angles), 0),
+        longest_gap_ms=max(gaps, default=0) * 1e-6,
     )
 
 
-def _recovered_ns(seen: list[Sample], until_ns: int) -> int | None:
-    """Return when the samples became valid for good: `until_ns` if they were all along."""
-    last_bad = max((k for k, sample in enumerate(seen) if not sample.valid), default=-1)
-    if last_bad < 0:
+def _recovered_ns(seen: list[Sample], gaps: list[int], until_ns: int) -> int | None:
+    """Return when valid samples came for good; `until_ns` if they did all along. `gaps[k]` is the time before sample k."""
+    silent = [k - 1 for k, gap in enumerate(gaps) if gap > _SILENCE_NS]
+    last_bad = max((k for k, sample in enumerate(seen) if not sample.valid), default=-2)
+    last_bad = max([last_bad, *silent])
+    if last_bad < -1:
         return until_ns
-    return int(seen[last_bad + 1].body["t_publish_ns"]) if last_bad + 1 < len(seen) else None
+    return seen[last_bad + 1].t_received_ns if last_bad + 1 < len(seen) else None
+
+
+def _missing(seen: list[Sample]) -> int:
+    """Count gaps in the sequence numbers, process by process."""
+    missing = 0
+    for earlier, later in pairwise(seen):
+        if earlier.body["run_id"] == later.body["run_id"]:
+            missing += later.body["seq"] - earlier.body["seq"] - 1
+    return missing
 
 
 def _error_deg(rig: Rig, sample: Sample) -> float:
@@ -147,18 +183,21 @@ def measure_all(name: str, folder: Path) -> list[Seen]:
 def table(results: list[Seen]) -> str:
     """Return the results as a Markdown table."""
     lines = [
-        "| fixtures | fault | the subscriber sees | detected in (ms) | recovered in (ms) | worst error (°) | stale as fresh |",
-        "|---|---|---|---|---|---|---|",
+        "| fixtures | fault | the subscriber sees | detected in (ms) | recovered in (ms) | slots without angles "
+        "| worst error (°) | stale as fresh |",
+        "|---|---|---|---|---|---|---|---|",
     ]
     for seen in results:
         states = [
             f"{status} ({reason})" if reason != "none" else status for (status, reason), n in seen.states.most_common() if n > 2
         ]
+        if seen.longest_gap_ms * 1e6 > _SILENCE_NS:
+            states.insert(0, f"nothing for {seen.longest_gap_ms / 1000:.1f} s")
         detected = "–" if seen.detected_ms is None else f"{seen.detected_ms:.0f}"
         recovered = "never" if seen.recovered_ms is None else f"{seen.recovered_ms:.0f}"
         lines.append(
             f"| {seen.rig} | {seen.fault.name}, {seen.fault.seconds:g} s | {', '.join(states)} | {detected} | {recovered} "
-            f"| {seen.worst_deg:.2f} | {seen.stale} |"
+            f"| {seen.lost} | {seen.worst_deg:.2f} | {seen.stale} |"
         )
     return "\n".join(lines) + "\n"
 

@@ -32,6 +32,27 @@ def inject(folder: Path, window: Window) -> None:
     new.replace(folder / FILE)
 
 
+SLEW = 500e-6  # the fastest that NTP turns a clock
+STEP_NS = 7_000_000_000
+
+
+class DeviceClock:
+    """What faults do to a device's own clock: a step that ends with the fault, or a slew whose offset stays."""
+
+    def __init__(self, injected: "Injected") -> None:
+        self._injected = injected
+        self._slewed_ns = 0.0
+        self._last_ns: int | None = None
+
+    def off_ns(self, t_ns: int) -> int:
+        """Return by how much the clock is off at an instant; ask for rising instants."""
+        fault = self._injected.fault(t_ns)
+        if fault == "clock_slew" and self._last_ns is not None:
+            self._slewed_ns += SLEW * (t_ns - self._last_ns)
+        self._last_ns = t_ns
+        return round(self._slewed_ns) + (STEP_NS if fault == "clock_step" else 0)
+
+
 class Injected:
     """What is to be done now, for a fixture that asks before every sample."""
 

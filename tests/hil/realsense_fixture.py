@@ -50,7 +50,8 @@ def here(
 
     def send(view: str, index: int, number: int, t_ns: int) -> None:
         # Stamped at the end of the exposure by the device's own clock, which runs 20 ppm fast, in whole microseconds.
-        t_device_ns = round((t_ns + half_exposure_ns - scene.epoch_ns + _CLOCK_AHEAD_NS) * 1.00002) // 1000 * 1000
+        t_device_ns = round((t_ns + half_exposure_ns - scene.epoch_ns + _CLOCK_AHEAD_NS) * 1.00002)
+        t_device_ns = (t_device_ns + feeder.clock.off_ns(t_ns)) // 1000 * 1000
         device.send_depth(scene.depth[view][index], number, t_device_ns, TimeDomain.HARDWARE)
         device.send_color(scene.color[view][index], number, t_device_ns, TimeDomain.HARDWARE)
 

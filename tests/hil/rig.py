@@ -19,6 +19,7 @@ from typing import Any
 import zenoh
 
 from ghest_rt.config.shipped import shipped_config_dir
+from ghest_rt.security.session import Mode
 from ghest_rt.service.zenoh_session import open_session
 from tests.hardware_encoders.can_senders import ARMEO_SOURCES
 from tests.hil.injection import FOLDER_VARIABLE, Window, inject
@@ -45,16 +46,18 @@ class Sample:
 class Subscriber:
     """Listens to a station, in place of the therapy software."""
 
-    def __init__(self, endpoint: str) -> None:
+    def __init__(self, endpoint: str, mode: Mode = "peer") -> None:
+        self.tokens: list[tuple[int, bool]] = []  # when the station's liveliness token came (True) and went
         self.angles: list[Sample] = []
         self.events: list[Sample] = []
         self.healths: list[Sample] = []
         self._changed = threading.Condition()
-        self._session, _ = open_session((), (endpoint,))
-        self._subscribers = [
+        self._session, _ = open_session((), (endpoint,), mode=mode)
+        self._subscribers: list[object] = [
             self._session.declare_subscriber(f"ghest/*/{key}", self._into(kept))
             for key, kept in (("gh/angles", self.angles), ("events", self.events), ("health", self.healths))
         ]
+        self._subscribers.append(self._session.liveliness().declare_subscriber("ghest/*/alive", self._token, history=True))
 
     def _into(self, kept: list[Sample]) -> Callable[[zenoh.Sample], None]:
         def take(sample: zenoh.Sample) -> None:
@@ -64,6 +67,10 @@ class Subscriber:
                 self._changed.notify_all()
 
         return take
+
+    def _token(self, sample: zenoh.Sample) -> None:
+        with self._changed:
+            self.tokens.append((time.monotonic_ns(), sample.kind == zenoh.SampleKind.PUT))
 
     def wait_until(self, condition: Callable[[], bool], timeout_s: float) -> bool:
         with self._changed:
@@ -123,8 +130,8 @@ class Rig:
 
 
 @contextmanager
-def fixture_rig(name: str, folder: Path, record_to: Path | None = None) -> Iterator[Rig]:
-    """Run the service on fixtures, "realsense-serial" or "oak-can"; with `record_to`, as `ghest-rt record` does."""
+def far_ends(name: str, folder: Path) -> Iterator[tuple[Path, dict[str, str], int]]:
+    """Run what sends encoder samples; yields the station file, the environment for a service on it, and that process's id."""
     if not (folder / "scene.npz").exists():
         write_scene(folder, time.monotonic_ns())
     station = folder / f"{name}.toml"
@@ -136,13 +143,26 @@ def fixture_rig(name: str, folder: Path, record_to: Path | None = None) -> Itera
     )
     try:
         assert talker.stdout is not None and talker.stdout.readline() == "ready\n"
-        doing = ["run"] if record_to is None else ["record", "--out", str(record_to)]
-        command = [sys.executable, "-m", "tests.hil.service", *doing, "--station", str(station)]
-        with _running(name, command, environment, folder, read_scene(folder)) as rig:
-            yield rig
+        yield station, environment, talker.pid
     finally:
         talker.kill()
         talker.communicate()
+
+
+def service_command(station: Path, record_to: Path | None = None) -> list[str]:
+    """Return how the service is started on fixtures; with `record_to`, as `ghest-rt record`."""
+    doing = ["run"] if record_to is None else ["record", "--out", str(record_to)]
+    return [sys.executable, "-m", "tests.hil.service", *doing, "--station", str(station)]
+
+
+@contextmanager
+def fixture_rig(name: str, folder: Path, record_to: Path | None = None) -> Iterator[Rig]:
+    """Run the service on fixtures, "realsense-serial" or "oak-can"; with `record_to`, as `ghest-rt record` does."""
+    with (
+        far_ends(name, folder) as (station, environment, _),
+        _running(name, service_command(station, record_to), environment, folder, read_scene(folder)) as rig,
+    ):
+        yield rig
 
 
 @contextmanager
@@ -157,7 +177,7 @@ def station_rig(station: Path) -> Iterator[Rig]:
 def _running(
     name: str, command: list[str], environment: dict[str, str], folder: Path | None, scene: Scene | None
 ) -> Iterator[Rig]:
-    endpoint = _free_endpoint()
+    endpoint = free_endpoint()
     log = folder / f"{name}.log" if folder is not None else Path(os.devnull)
     with log.open("w") as output:
         service = subprocess.Popen(
@@ -219,6 +239,16 @@ def _can_port(folder: Path) -> int:
     return 40_000 + zlib.crc32(str(folder).encode()) % 9_000
 
 
-def _free_endpoint() -> str:
+def wait_until(condition: Callable[[], bool], timeout_s: float) -> bool:
+    """Look again and again; return whether it came true in time."""
+    deadline_s = time.monotonic() + timeout_s
+    while not condition():
+        if time.monotonic() > deadline_s:
+            return False
+        time.sleep(0.01)
+    return True
+
+
+def free_endpoint() -> str:
     with socket.create_server(("127.0.0.1", 0)) as probe:
         return f"tcp/127.0.0.1:{probe.getsockname()[1]}"

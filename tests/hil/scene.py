@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial.transform import Rotation, Slerp
 
 from ghest_drivers.samples import Intrinsics
 
@@ -63,6 +62,8 @@ class Scene:
 
     def error_deg(self, t_ns: int, quaternion_wxyz: list[float]) -> float:
         """Angle between a published orientation and the true one."""
+        from scipy.spatial.transform import Rotation, Slerp  # the fixtures' processes start sooner without
+
         at = self.world_s(t_ns) * TRUTH_RATE_HZ
         k = min(int(at), len(self.gh_from_arm) - 2)
         truth = Slerp([k, k + 1], Rotation.from_matrix(self.gh_from_arm[k : k + 2]))(at)

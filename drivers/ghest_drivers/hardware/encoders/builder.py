@@ -38,14 +38,25 @@ class SampleBuilder:
     With a device time, `t_capture_ns` comes from the clock fit; without, it is the arrival less the known latency.
     """
 
-    def __init__(self, channels: tuple[Channel, ...], counting: Counting, stats: LinkStats) -> None:
+    def __init__(
+        self, channels: tuple[Channel, ...], counting: Counting, stats: LinkStats, clock: ClockMap | None = None
+    ) -> None:
+        """Begin a connection.
+
+        Args:
+            channels: The encoders.
+            counting: How the device counts.
+            stats: Where rejections are counted.
+            clock: The fit of an earlier connection: a device's clock runs on when its cable is pulled, and only a known clock
+                tells how old the samples are that come in a burst when it is back. A clock that started anew is noticed.
+        """
         self._converter = AngleConverter(channels)
         self._counting = counting
         self._stats = stats
         wrap_ns = None
         if counting.tick_ns is not None and counting.wrap_ticks is not None:
             wrap_ns = counting.wrap_ticks * counting.tick_ns
-        self.clock = ClockMap(wrap_ns, latency_ns=counting.latency_ns)
+        self.clock = clock or ClockMap(wrap_ns, latency_ns=counting.latency_ns)
         self._raw_seq: int | None = None
         self._raw_ticks: int | None = None
         self._seq = -1

@@ -72,7 +72,7 @@ class SampleQueueLink(ABC):
             return
         self._queue.clear()
         self._failure = None
-        self._builder = SampleBuilder(self._channels, self._counting, self.stats)
+        self._builder = SampleBuilder(self._channels, self._counting, self.stats, self._builder.clock)
         self._alive_ns = self._clock.now_ns()
         self._open = True
         try:
