@@ -22,7 +22,7 @@ TITLES = {
     "refined": "refined",
     "fused": "fused",
 }
-_LEAST_IN_BIN = 20
+_LEAST_IN_BIN = 10
 
 Row = dict[str, object]
 

@@ -31,6 +31,8 @@ def compare(
     from ghest_rt.studies import movements as plan
     from ghest_rt.studies.compare import QUICK, CompareSettings
     from ghest_rt.studies.compare import compare as run_compare
+    from ghest_rt.studies.figures.style import save_figure
+    from ghest_rt.studies.report.compare_figures import draw_angles, draw_contenders
     from ghest_rt.studies.report.results import write_results
 
     names = tuple(m.value for m in movement or ())
@@ -41,21 +43,23 @@ def compare(
     )
     with shown_progress("compare") as progress:
         summary = run_compare(QUICK if quick else settings, store_in(out), executor(workers, scheduler), progress)
-    paths = write_results(out, "compare", summary, cast(list[dict[str, Any]], summary["rows"]))
+    document = write_results(out, "compare", summary, cast(list[dict[str, object]], summary["rows"]))
+    for name in document["settings"]["sensors"]:
+        save_figure(draw_contenders(document, name), out / "compare" / "figures", f"contenders_{name}")
+        save_figure(draw_angles(document, name), out / "compare" / "figures", f"angles_{name}")
     if as_json:
-        print_json(summary)
+        print_json(document)
     else:
-        _print(summary, paths)
+        _print(document, out / "compare")
 
 
-def _print(summary: dict[str, object], paths: list[Path]) -> None:
+def _print(summary: dict[str, Any], folder: Path) -> None:
     from rich import box
     from rich.console import Console
     from rich.table import Table
 
     console = Console()
-    contenders = cast(list[dict[str, Any]], summary["contenders"])
-    verdicts = cast(list[dict[str, Any]], summary["verdicts"])
+    contenders, verdicts = summary["contenders"], summary["verdicts"]
     for k, group in enumerate(contenders[0]["measured"]):
         of_kind = "Table 2's movements" if group["kind"] == "therapy" else "recorded movements"
         table = Table(
@@ -86,13 +90,14 @@ def _print(summary: dict[str, object], paths: list[Path]) -> None:
     for line in verdicts:
         if not line["fused_wins"]:
             console.print(f"  {line['movement']} ({line['sensor']}): {line['verdict']}", markup=False, highlight=False)
-    console.print(f"written: {', '.join(str(path) for path in paths)}", markup=False, highlight=False)
+    console.print(f"Tables, summary and figures: {folder}", markup=False)
 
 
-def _deg(value: float) -> str:
+def _deg(value: float | None) -> str:
+    if value is None:
+        return "-"
     return f"{value:.3f}" if value < 1.0 else f"{value:.3g}"
 
 
-def _movements(summary: dict[str, object], group: dict[str, Any]) -> set[str]:
-    rows = cast(list[dict[str, Any]], summary["rows"])
-    return {row["movement"] for row in rows if (row["sensor"], row["kind"]) == (group["sensor"], group["kind"])}
+def _movements(summary: dict[str, Any], group: dict[str, Any]) -> set[str]:
+    return {row["movement"] for row in summary["rows"] if (row["sensor"], row["kind"]) == (group["sensor"], group["kind"])}

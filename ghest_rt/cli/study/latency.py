@@ -37,8 +37,10 @@ def latency(
     need_study()
     from ghest_rt.cli.console import print_json
     from ghest_rt.studies import movements as plan
+    from ghest_rt.studies.figures.style import save_figure
     from ghest_rt.studies.latency import QUICK, LatencySettings
     from ghest_rt.studies.latency import latency as run_latency
+    from ghest_rt.studies.report.latency_figures import draw_latency
     from ghest_rt.studies.report.results import write_results
 
     names = tuple(m.value for m in movement or ())
@@ -50,20 +52,21 @@ def latency(
     )
     with shown_progress("latency") as progress:
         summary = run_latency(QUICK if quick else settings, store_in(out), executor(workers, scheduler), progress)
-    paths = write_results(out, "latency", summary, cast(list[dict[str, Any]], summary["rows"]))
+    document = write_results(out, "latency", summary, cast(list[dict[str, object]], summary["rows"]))
+    save_figure(draw_latency(document), out / "latency" / "figures", "latency")
     if as_json:
-        print_json(summary)
+        print_json(document)
     else:
-        _print(summary, paths)
+        _print(document, out / "latency")
 
 
-def _print(summary: dict[str, object], paths: list[Path]) -> None:
+def _print(summary: dict[str, Any], folder: Path) -> None:
     from rich import box
     from rich.console import Console
     from rich.table import Table
 
     console = Console()
-    candidates = cast(list[dict[str, Any]], summary["candidates"])
+    candidates = summary["candidates"]
     table = Table(title="Answers when they are published", title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
     table.add_column("method", no_wrap=True)
     for column in ("lag\nms", "image\nms old", "behind\nms", "error\n° RMS"):
@@ -77,10 +80,10 @@ def _print(summary: dict[str, object], paths: list[Path]) -> None:
     table.add_column("movement", no_wrap=True)
     for column in ("speed", "°/s RMS", *(who["title"].replace(", ", "\n") for who in candidates)):
         table.add_column(column, justify="right")
-    rows = cast(list[dict[str, Any]], summary["rows"])
+    rows = summary["rows"]
     for movement, speed in dict.fromkeys((row["movement"], row["speed"]) for row in rows):
         there = {row["candidate"]: row for row in rows if (row["movement"], row["speed"]) == (movement, speed)}
         errors = (f"{there[who['key']]['published_deg']:.3f}" for who in candidates)
         table.add_row(movement, f"{speed:g}", f"{there['fused']['rms_speed_dps']:.1f}", *errors)
     console.print(table)
-    console.print(f"written: {', '.join(str(path) for path in paths)}", markup=False, highlight=False)
+    console.print(f"Tables, summary and figures: {folder}", markup=False)

@@ -1,4 +1,4 @@
-"""The results folder that studies write and the report reads: a JSON summary and tidy tables per study."""
+"""The results folder that studies write and the report reads: a summary and tidy tables, a folder for each study."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -7,40 +7,42 @@ from typing import Any
 
 import numpy as np
 
-from ghest_rt.errors import BadInputError, GhestError
-from ghest_rt.studies.engine.tables import write_tables
+from ghest_rt.errors import BadInputError
+from ghest_rt.studies.engine.tables import write_summary, write_tables
+
+SUMMARY = "summary.json"
 
 
-def write_results(folder: Path, name: str, summary: Mapping[str, object], rows: Sequence[Mapping[str, object]]) -> list[Path]:
-    """Write `<name>.json`, and the rows as `<name>.csv` and `<name>.parquet`; return the paths.
+def write_results(
+    folder: Path, name: str, summary: Mapping[str, object], rows: Sequence[Mapping[str, object]]
+) -> dict[str, Any]:
+    """Write a study's summary and rows into a folder of its name in the results folder; return the summary as it was written.
 
     Raises:
         GhestError: The folder cannot be written to, or PyArrow is not installed.
     """
-    paths = write_tables(rows, folder, name)
-    text = json.dumps(plain(summary), indent=2, allow_nan=False) + "\n"
-    try:
-        (folder / f"{name}.json").write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise GhestError(f"{folder}: cannot be written to: {error.strerror or error}") from error
-    return [folder / f"{name}.json", *paths]
+    document = {key: plain(value) for key, value in summary.items()}
+    write_summary(document, folder / name)
+    write_tables(rows, folder / name, "rows")
+    return document
 
 
 def read_summary(folder: Path, name: str) -> dict[str, Any] | None:
-    """Return a study's summary, or None if it is not in the folder.
+    """Return a study's summary, or None if it is not in the results folder.
 
     Raises:
         BadInputError: The file is no summary.
     """
-    path = folder / f"{name}.json"
+    path = folder / name / SUMMARY
     if not path.is_file():
         return None
+    remedy = f"run `ghest-rt study {name}` again"
     try:
         found = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
-        raise BadInputError(f"{path}: is no summary of a study: {error}; run `ghest-rt study {name}` again") from error
+        raise BadInputError(f"{path}: is no summary of a study: {error}; {remedy}") from error
     if not isinstance(found, dict):
-        raise BadInputError(f"{path}: is no summary of a study; run `ghest-rt study {name}` again")
+        raise BadInputError(f"{path}: is no summary of a study; {remedy}")
     return found
 
 
