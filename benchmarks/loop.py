@@ -1,7 +1,7 @@
 """The live loop on a 128x128 recording at recorded pace: rate, lateness beside a bare `clock_nanosleep` loop, CPU, memory.
 
-The service runs in a process of its own and publishes on Zenoh to one subscriber, as in the clinic; the bare loop runs at the
-same time on the same cores, so that both suffer the same machine.
+Each method in turn. The service runs in a process of its own and publishes on Zenoh to one subscriber, as in the clinic; the
+bare loop runs at the same time on the same cores, so that both suffer the same machine.
 """
 
 import json
@@ -18,14 +18,19 @@ from benchmarks.scenes import long_scene, scene
 
 _RATE_HZ = 66.6
 _ENDPOINT = "tcp/127.0.0.1:17447"
+_METHODS = ("refined", "fused")
 _COMMAND = str(Path(sys.executable).with_name("ghest-rt"))
 
 
 def run(quick: bool) -> dict[str, Any]:
-    """Replay at recorded pace while a bare loop runs for 60 s (quick: 8 s)."""
+    """Replay at recorded pace while a bare loop runs for 60 s (quick: 8 s), once with each method."""
     seconds = 8.0 if quick else 60.0
     recording = long_scene(seconds + 3.0)
-    service = _start_service(recording, "--json")
+    return {method: _run_method(recording, method, seconds) for method in _METHODS}
+
+
+def _run_method(recording: Path, method: str, seconds: float) -> dict[str, Any]:
+    service = _start_service(recording, "--method", method, "--json")
     time.sleep(1.5)  # interpreter and imports
     cpu_before_s = _cpu_s(service.pid)
     listener = subprocess.Popen(

@@ -21,8 +21,8 @@ def draw(results: dict[str, dict[str, Any]], out: Path) -> None:
         left.barh(names, medians, xerr=[[0.0] * len(spread), spread], color=colors, ecolor="0.4", capsize=3)
         left.set_xlabel("one marker pose from a 640x480 frame (ms): median, whisker to p99")
     if "loop" in results:
-        loop = results["loop"]
-        groups = {"ghest-rt": loop["lateness_us"], "bare clock_nanosleep": loop["bare_clock_nanosleep_us"]}
+        loop = results["loop"]["fused"]
+        groups = {"ghest-rt (fused)": loop["lateness_us"], "bare clock_nanosleep": loop["bare_clock_nanosleep_us"]}
         for offset, (name, values) in enumerate(groups.items()):
             positions = [k + 0.38 * offset for k in range(2)]
             right.bar(positions, [values["p50"], values["p99"]], width=0.36, label=name, color=(_OURS, _THEIRS)[offset])
