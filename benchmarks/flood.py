@@ -6,6 +6,7 @@ service have to do with it. `ghest-rt certs` makes the identities; the flooder i
 """
 
 import json
+import socket
 import subprocess
 import sys
 import tempfile
@@ -19,6 +20,7 @@ from benchmarks.flooder import KINDS
 from benchmarks.scenes import long_scene
 from ghest_rt.config.shipped import shipped_config_dir
 from ghest_rt.security.authority import Authority
+from ghest_rt.security.endpoints import split_endpoint
 from ghest_rt.security.roles import Role
 
 _COMMAND = str(Path(sys.executable).with_name("ghest-rt"))
@@ -51,10 +53,11 @@ def _one(  # noqa: PLR0917
     flooder = [sys.executable, "-m", "benchmarks.flooder"]
     service_command = [_COMMAND, "--replay", str(recording), "--station", str(station_file), "--json"]
     with (
-        subprocess.Popen([*flooder, "decoy", _DECOY, str(identity), str(seconds + _WARM_UP_S)]) as decoy,
+        subprocess.Popen([*flooder, "decoy", _DECOY, str(identity), str(seconds + 2.0 * _WARM_UP_S)]) as decoy,
         subprocess.Popen(service_command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as service,
     ):
         watched = psutil.Process(service.pid)
+        _wait_for(_TARGET)
         time.sleep(_WARM_UP_S)
         before_s = sum(watched.cpu_times()[:2])
         flood = subprocess.run(
@@ -73,6 +76,18 @@ def _one(  # noqa: PLR0917
         "cpu_share_of_one_core": round(used_s / seconds, 3),
         "resident_mb": round(resident_mb, 1),
     }
+
+
+def _wait_for(endpoint: str) -> None:
+    _, host, port = split_endpoint(endpoint)
+    for _ in range(300):
+        try:
+            socket.create_connection((host, port)).close()
+        except ConnectionRefusedError:
+            time.sleep(0.1)
+        else:
+            return
+    raise TimeoutError(f"nobody listens on {endpoint}")
 
 
 def _station_file(folder: Path, endpoint: str, identity: Path) -> Path:

@@ -158,9 +158,7 @@ def record(
     from ghest_rt.cli.recording import RecordOptions
     from ghest_rt.cli.run import RunOptions, run_station
 
-    recording = RecordOptions(
-        out, part_mb * 1_000_000, round(part_min * 60e9), compress, tuple(encrypt_to or ()), subject
-    )
+    recording = RecordOptions(out, part_mb * 1_000_000, round(part_min * 60e9), compress, tuple(encrypt_to or ()), subject)
     run_station(RunOptions(station, method, listen, not no_publish, duration_s, as_json, movement, seed, recording))
 
 
@@ -361,9 +359,7 @@ def decrypt(
         typer.Argument(metavar="RECORDING...", help="Sealed recordings (.age), or folders of them", show_default=False),
     ],
     key: Annotated[Path, typer.Option(metavar="FILE", help="Secret key", show_default=False)],
-    out: Annotated[
-        Path | None, typer.Option(metavar="FOLDER", help="Where to, if not beside them", show_default=False)
-    ] = None,
+    out: Annotated[Path | None, typer.Option(metavar="FOLDER", help="Where to, if not beside them", show_default=False)] = None,
 ) -> None:
     """Open sealed recordings (needs the extra 'security')."""
     from ghest_rt.cli.decrypt import decrypt as open_sealed

@@ -12,6 +12,8 @@ from rich.console import Console
 from ghest_drivers.clock import Clock
 from ghest_drivers.interfaces import EncoderLink, RgbdCamera
 from ghest_rt.config.load import LoadedStation
+from ghest_rt.security.sealing import check_recipients
+from ghest_rt.security.subjects import check_subject
 from ghest_rt.service.recorder import Recorder
 from ghest_rt.service.recorder_parts import Parts
 from ghest_rt.service.recorder_settings import RecorderCounts, RecorderSettings, drops_in_words
@@ -27,12 +29,16 @@ class RecordOptions:
         part_bytes: Size at which another file begins.
         part_ns: Time after which another file begins.
         compress: Smaller files for more processor time.
+        encrypt_to: Public keys that the files are sealed for, beside those of the station file.
+        subject: Pseudonym of the patient, written into the files.
     """
 
     folder: Path
     part_bytes: int
     part_ns: int
     compress: bool
+    encrypt_to: tuple[str, ...] = ()
+    subject: str | None = None
 
 
 class LiveRecording:
@@ -43,8 +49,15 @@ class LiveRecording:
     """
 
     def __init__(self, options: RecordOptions, station: LoadedStation, clock: Clock) -> None:
-        settings = RecorderSettings(part_bytes=options.part_bytes, part_ns=options.part_ns, compress=options.compress)
+        recipients = tuple(dict.fromkeys((*station.config.recorder.encrypt_to, *options.encrypt_to)))
+        if recipients:
+            check_recipients(recipients)
+        settings = RecorderSettings(
+            part_bytes=options.part_bytes, part_ns=options.part_ns, compress=options.compress, recipients=recipients
+        )
         facts = {"created_by": f"ghest-rt {version('ghest-rt')}", "command": "ghest-rt record"}
+        if options.subject is not None:
+            facts["subject"] = check_subject(options.subject)
         parts = Parts(options.folder, station, facts, settings, started_unix_ns=time.time_ns(), now_ns=clock.now_ns())
         self._recorder = Recorder(parts, settings, clock)
         self._recorder.start()

@@ -104,7 +104,7 @@ def complete_channels(path: Path, scan: Scan) -> None:
                     stream = ReadDataStream(BytesIO(body)) if opcode in (Opcode.SCHEMA, Opcode.CHANNEL) else None
                     if stream and opcode == Opcode.SCHEMA:
                         schema = Schema.read(stream)
-                        scan.schemas[schema.id] = schema
+                        scan.schemas[schema.id] = schema.name
                     elif stream:
                         channel = Channel.read(stream)
                         scan.channels[channel.id] = channel

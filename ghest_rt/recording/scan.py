@@ -16,6 +16,8 @@ from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Metadata, Schema
 
 from ghest_rt.errors import BadInputError
+from ghest_rt.recording import layout
+from ghest_rt.security.sealing import SEALED_MAGIC
 
 MAGIC = b"\x89MCAP0\r\n"
 MAX_SMALL_BYTES = 4_000_000  # any record but chunks and messages
@@ -25,6 +27,9 @@ _MESSAGE_HEAD = struct.Struct("<HIQQ")
 _CHUNK_HEAD = struct.Struct("<QQQII")
 _LENGTH = struct.Struct("<Q")
 _RUN_BYTES = 1_000_000
+# Others are left where they are: a file may hold any number of them.
+_ATTACHMENTS = {layout.STATION_ATTACHMENT, layout.URDF_ATTACHMENT}
+_METADATA = {layout.FACTS, layout.GRID}
 _DECODABLE = {Opcode.SCHEMA, Opcode.CHANNEL, Opcode.ATTACHMENT, Opcode.METADATA}
 
 
@@ -59,7 +64,7 @@ class Scan:
 
     Attributes:
         blocks: Where the messages are, in file order.
-        schemas: By id, as far as they stand outside chunks (summary, or file without chunks).
+        schemas: Names by id, as far as they stand outside chunks (summary, or file without chunks).
         channels: By id, likewise.
         attachments: By name, the first of each.
         metadata: By name, the first of each.
@@ -69,7 +74,7 @@ class Scan:
     """
 
     blocks: list[Block] = field(default_factory=list)
-    schemas: dict[int, Schema] = field(default_factory=dict)
+    schemas: dict[int, str] = field(default_factory=dict)
     channels: dict[int, Channel] = field(default_factory=dict)
     attachments: dict[str, bytes] = field(default_factory=dict)
     metadata: dict[str, dict[str, str]] = field(default_factory=dict)
@@ -93,6 +98,8 @@ def scan_file(path: Path) -> Scan:
             magic = file.read(len(MAGIC))
             if not magic:
                 raise BadInputError(f"{path}: the file is empty; record it again")
+            if magic == SEALED_MAGIC[: len(MAGIC)]:
+                raise BadInputError(f"{path}: this recording is sealed; ghest-rt decrypt opens it with your key")
             if magic != MAGIC:
                 raise BadInputError(f"{path}: not an MCAP file (byte 0: {magic.hex(' ')}); see docs/recording-format.md")
             return _Walk(file, path.stat().st_size).run()
@@ -151,15 +158,18 @@ class _Walk:
         scan = self._scan
         if opcode == Opcode.ATTACHMENT:
             attachment = Attachment.read(stream)
-            scan.attachments.setdefault(attachment.name, attachment.data)
+            if attachment.name in _ATTACHMENTS:
+                scan.attachments.setdefault(attachment.name, attachment.data)
         elif opcode == Opcode.METADATA:
             metadata = Metadata.read(stream)
-            scan.metadata.setdefault(metadata.name, metadata.metadata)
+            if metadata.name in _METADATA:
+                scan.metadata.setdefault(metadata.name, metadata.metadata)
         elif opcode == Opcode.SCHEMA:
             schema = Schema.read(stream)
-            scan.schemas[schema.id] = schema
+            scan.schemas[schema.id] = schema.name
         else:
             channel = Channel.read(stream)
+            channel.metadata = {}  # not used, and of any size
             scan.channels[channel.id] = channel
 
     def _chunk(self, byte: int, data_byte: int, length: int) -> None:

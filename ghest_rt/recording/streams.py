@@ -67,8 +67,7 @@ def find_streams(path: Path, scan: Scan, cameras: Iterable[str]) -> dict[int, St
     for channel in scan.channels.values():
         if channel.topic in known:
             stream = known[channel.topic]
-            schema = scan.schemas.get(channel.schema_id)
-            _check_encoding(path, stream, channel.message_encoding, schema.name if schema else "")
+            _check_encoding(path, stream, channel.message_encoding, scan.schemas.get(channel.schema_id, ""))
             streams[channel.id] = stream
     present = {stream.topic for stream in streams.values()}
     missing = [stream.topic for stream in needed if stream.topic not in present]

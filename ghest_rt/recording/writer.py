@@ -1,11 +1,11 @@
 """Write recordings (docs/recording-format.md)."""
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
-from typing import Literal, Self
+from typing import IO, Any, Literal, Self, cast
 
 import numpy as np
 from foxglove_schemas_protobuf.CameraCalibration_pb2 import CameraCalibration
@@ -20,6 +20,7 @@ from ghest_rt.config.load import LoadedStation
 from ghest_rt.errors import BadInputError, GhestError
 from ghest_rt.messages.results import TruthSample
 from ghest_rt.recording import layout, rows
+from ghest_rt.security.sealing import SealedFile
 
 _CHUNK_BYTES = 1_000_000  # what a cut loses at most, beside the message that filled the chunk
 _DATA_FIELD_KEY = bytes([6 << 3 | 2])  # RawImage.data, length-delimited
@@ -45,6 +46,7 @@ class RecordingWriter:
         station: The station file and URDF to carry along.
         facts: Free key-value facts about the recording, such as the command that made it.
         compression: "none" where the time of writing matters more than the size.
+        recipients: Public keys that the file is sealed for while it is written; none for a plain file.
 
     Raises:
         BadInputError: The file cannot be created.
@@ -58,15 +60,16 @@ class RecordingWriter:
         station: LoadedStation,
         facts: Mapping[str, str],
         compression: Literal["zstd", "none"] = "zstd",
+        recipients: Sequence[str] = (),
     ) -> None:
         if "format" in facts:
             raise ValueError("the fact `format` is set by the writer")
         try:
-            self._file = path.open("wb")
+            self._file = SealedFile(path, recipients) if recipients else path.open("wb")
         except OSError as error:
             raise BadInputError(f"{path}: cannot write the recording: {error.strerror or error}") from error
         self._path = path
-        self._writer = Writer(self._file, chunk_size=_CHUNK_BYTES, compression=_COMPRESSION[compression])
+        self._writer = Writer(cast(IO[Any], self._file), chunk_size=_CHUNK_BYTES, compression=_COMPRESSION[compression])
         self._schemas: dict[str, int] = {}
         self._channels: dict[str, int] = {}
         self._cameras: dict[str, _CameraChannels] = {}

@@ -10,6 +10,7 @@ from ghest_drivers.samples import CameraInfo
 from ghest_rt.config.load import LoadedStation
 from ghest_rt.errors import BadInputError, GhestError
 from ghest_rt.recording.writer import RecordingWriter
+from ghest_rt.security.sealing import SEALED_SUFFIX
 from ghest_rt.service.camera_worker import same_camera
 from ghest_rt.service.recorder_settings import RecorderSettings
 from ghest_rt.service.recorder_sync import DiskSync
@@ -20,8 +21,8 @@ _ALIVE_NS = 250_000_000  # an input that delivered within this time will deliver
 class Parts:
     """Writes to the newest file and begins the next one when that has become large or long enough. For one thread.
 
-    The files are called `<station>-<start, UTC>-<number>.mcap`. A part begins while every input is delivering, so that
-    none lacks a stream: during the outage of an input a part grows beyond its limits.
+    The files are called `<station>-<start, UTC>-<number>.mcap`, with `.age` if they are sealed. A part begins
+    while every input is delivering, so that none lacks a stream: during the outage of an input a part grows beyond its limits.
 
     Args:
         folder: Where the files go; made if it does not exist.
@@ -136,11 +137,16 @@ class Parts:
 
     def _next_part(self) -> RecordingWriter:
         number = len(self.files)
-        path = self._stem.with_name(f"{self._stem.name}-{number:03d}.mcap")
+        suffix = f".mcap{SEALED_SUFFIX}" if self._settings.recipients else ".mcap"
+        path = self._stem.with_name(f"{self._stem.name}-{number:03d}{suffix}")
         if path.exists():
             raise BadInputError(f"{path}: exists already; start again, or name another folder")
         writer = RecordingWriter(
-            path, self._station, {**self._facts, "part": str(number)}, "zstd" if self._settings.compress else "none"
+            path,
+            self._station,
+            {**self._facts, "part": str(number)},
+            "zstd" if self._settings.compress else "none",
+            self._settings.recipients,
         )
         self.files.append(path)
         self._sync.watch(writer.fileno())

@@ -16,6 +16,7 @@ class RecorderSettings:
         sync_ns: From one time that the disk is made to take what was written to the next: so much a power failure loses.
         queue_bytes: What may wait for the disk; beyond it frames are dropped. At 2 x 640x480 at 60 Hz: 0.8 s.
         compress: Smaller files (zstd) for more processor time; the content is the same.
+        recipients: Public keys that the files are sealed for; none for plain files.
         drain_s: How long the end of a run waits for the disk.
     """
 
@@ -25,6 +26,7 @@ class RecorderSettings:
     sync_ns: int = 500_000_000
     queue_bytes: int = 150_000_000
     compress: bool = False
+    recipients: tuple[str, ...] = ()
     drain_s: float = 10.0
 
 

@@ -1,6 +1,6 @@
 """A process that records at 100 Hz and tells what it has handed over; to be killed, or to run out of disk.
 
-`python -m tests.recording_live.feeder FOLDER [--max-file-bytes N] [--seconds S]`
+`python -m tests.recording_live.feeder FOLDER [--max-file-bytes N] [--seconds S] [--recipient AGE1…]`
 """
 
 import argparse
@@ -20,6 +20,7 @@ def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("folder", type=Path)
     parser.add_argument("--max-file-bytes", type=int)
+    parser.add_argument("--recipient", action="append", default=[])
     parser.add_argument("--seconds", type=float, default=60.0)
     arguments = parser.parse_args()
     if arguments.max_file_bytes is not None:
@@ -27,7 +28,7 @@ def main() -> None:
     clock = MonotonicClock()
     t_0_ns = clock.now_ns()
     feed = Feed(160, 120, t_0_ns)
-    settings = RecorderSettings()
+    settings = RecorderSettings(recipients=tuple(arguments.recipient))
     parts = Parts(arguments.folder, STATION, {}, settings, started_unix_ns=time.time_ns(), now_ns=t_0_ns)
     recorder = Recorder(parts, settings, clock)
     recorder.start()

@@ -1,0 +1,71 @@
+"""`ghest-rt decrypt` and `ghest-rt recording-key`: sealed recordings, and the keys that open them."""
+
+import sys
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, DownloadColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
+
+from ghest_rt.errors import BadInputError
+from ghest_rt.security.extra import need_security
+from ghest_rt.security.sealing import SEALED_SUFFIX, make_recording_key
+
+
+def decrypt(sealed: Sequence[Path], key: Path, out: Path | None) -> None:
+    """Restore sealed recordings beside themselves, or in another folder.
+
+    Raises:
+        BadInputError: A file is not sealed, not for this key or not readable; a restored file exists already.
+        GhestError: The extra `security` is not installed.
+    """
+    need_security()
+    from ghest_rt.security.unsealing import load_keys, unseal  # noqa: PLC0415  (needs the extra `security`)
+
+    keys = load_keys(key)
+    paths = [path for given in sealed for path in _files(given)]
+    columns = (TextColumn("{task.description}"), BarColumn(), DownloadColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        for path in paths:
+            name = path.name.removesuffix(SEALED_SUFFIX)
+            folder = path.parent if out is None else out
+            folder.mkdir(parents=True, exist_ok=True)
+            if name == path.name and folder == path.parent:
+                raise BadInputError(f"{path}: does not end in {SEALED_SUFFIX}; name another folder with --out")
+            task = bar.add_task(path.name, total=path.stat().st_size)
+            restored = unseal(path, folder / name, keys, partial(_advance, bar, task))
+            typer.echo(f"{restored.path}: {restored.size_bytes / 1e6:.1f} MB")
+            if not restored.whole:
+                sys.stderr.write(f"{path}: cut off or changed after that; what comes before is restored and can be read\n")
+
+
+def recording_key(out: Path) -> None:
+    """Make a pair of keys for sealed recordings.
+
+    Raises:
+        BadInputError: The file exists, or cannot be written.
+        GhestError: The extra `security` is not installed.
+    """
+    public = make_recording_key(out)
+    typer.echo(
+        f"secret key: {out}: keep it off the stations, with a copy: without it sealed recordings are lost\n"
+        f"public key: {public}\n"
+        f'ghest-rt record --encrypt-to {public}, or [recorder] encrypt_to = ["{public}"] in the station file'
+    )
+
+
+def _advance(bar: Progress, task: TaskID, size_bytes: int) -> None:
+    bar.update(task, completed=size_bytes)
+
+
+def _files(given: Path) -> list[Path]:
+    if not given.is_dir():
+        if not given.exists():
+            raise BadInputError(f"{given}: no such file")
+        return [given]
+    found = sorted(given.glob(f"*{SEALED_SUFFIX}"))
+    if not found:
+        raise BadInputError(f"{given}: no sealed recording (*{SEALED_SUFFIX}) in this folder")
+    return found
