@@ -66,6 +66,13 @@ def test_a_good_file_loads_with_its_urdf(tmp_path: Path) -> None:
         ("r1 = [[1.0", "r2 = [[1.0", ("calibration.link_from_camera", "lacks r1")),
         ('marker = "m1"', 'marker = "m0"', ("cameras.r1.marker must be m1",)),
         ("format = 1", "format = 2", ("format",)),
+        ("[encoders]", '[elbow]\nlink = "l8"\naxis = [0.0, 2.0, 0.0]\n[encoders]', ("elbow", "length 1")),
+        (
+            "[encoders]",
+            '[elbow]\nlink = "l8"\naxis = [0.0, 1.0, 0.0]\npronation_joint = "j8"\n[encoders]',
+            ("elbow.pronation_joint j8", "encoders.joints"),
+        ),
+        ('arm = "right"', 'arm = "right"\n[joint]\nflexion_sign = 2', ("joint.flexion_sign",)),
         ("format = 1", "format = = 1", ("not a valid TOML file", "line 2")),
     ],
 )

@@ -123,6 +123,13 @@ def test_what_the_recording_ends_too_early_for_is_said_so(make_clinic: Callable[
     assert {each.status for each in ended} == {Status.LOST}
 
 
+def test_cameras_that_end_one_after_the_other_end_with_the_recording(make_clinic: Callable[..., Any]) -> None:
+    clinic = make_clinic(1)
+    found = run(clinic, recording(clinic, offset_ms=20.0, skip={("r0", 59)}))
+    assert {each.reason for each in found[:-3]} == {Reason.NONE}
+    assert found[-1].reason is Reason.END_OF_RECORDING
+
+
 def test_a_camera_that_dies_is_missed_to_the_end(make_clinic: Callable[..., Any]) -> None:
     clinic = make_clinic(1)
     found = run(clinic, recording(clinic, skip={("r1", k) for k in range(30, 60)}))
