@@ -5,6 +5,7 @@ import typer
 from ghest_rt.cli.study.accuracy import accuracy
 from ghest_rt.cli.study.compare import compare
 from ghest_rt.cli.study.latency import latency
+from ghest_rt.cli.study.report import report
 from ghest_rt.cli.study.sensitivity import sensitivity
 
 app = typer.Typer(
@@ -16,3 +17,4 @@ app.command()(accuracy)
 app.command()(sensitivity)
 app.command()(compare)
 app.command()(latency)
+app.command()(report)

@@ -1,0 +1,122 @@
+"""The report's section on the comparison: Table 7 made real."""
+
+from pathlib import Path
+from typing import Any
+
+from ghest_rt.studies.report.page import Cell, Section, Statement, Table, figure_of, number
+
+Row = dict[str, Any]
+
+_KINDS = {"therapy": "the movements of Table 2", "recorded": "recorded movements of people"}
+_COLUMNS = (
+    ("orientation_deg", "GH rotation"),
+    ("published_deg", "when published"),
+    ("flexion_deg", "flexion"),
+    ("abduction_deg", "abduction"),
+    ("rotation_deg", "rotation"),
+)
+
+
+def compare_section(summary: Row, folder: Path) -> Section:
+    """Return the section.
+
+    Args:
+        summary: Summary of `study compare`.
+        folder: The study's folder.
+    """
+    contenders = summary["contenders"]
+    groups = [(group["sensor"], group["kind"]) for group in contenders[0]["measured"]]
+    tables = [_table(summary, sensor, kind) for sensor, kind in groups]
+    tables += [_by_movement(summary, sensor) for sensor in summary["settings"]["sensors"]]
+    figures = [
+        figure_of(path, caption + f", sensor {path.stem.partition('_')[2]}")
+        for pattern, caption in (
+            ("contenders_*.png", "Errors of the GH rotation; a symbol per movement"),
+            ("angles_*.png", "Errors angle by angle"),
+        )
+        for path in sorted((folder / "figures").glob(pattern))
+    ]
+    return Section(
+        key="compare",
+        title="Comparison with other ways (Table 7)",
+        paragraphs=(
+            "Every contender estimates the same simulated sessions, through the same interface. Rivals are calibrated in "
+            "the neutral posture and told the patient's dimensions exactly (the inertial sensors: their true attitudes at"
+            " the start); nobody sees the truth after that. Errors are root mean squares over a movement, then means over"
+            " movements and seeds; degrees. “When published” is judged by where the arm is at the instant at which the "
+            "answer is published, all other columns at the instant for which it is meant.",
+        ),
+        tables=tuple(tables),
+        figures=tuple(figures),
+        statements_title="Does fused win?",
+        statements=_statements(summary),
+        notes=tuple(
+            (who["title"], f"{who['source']}. Its own publication: {who['published']}. To bear in mind: {who['caveat']}.")
+            for who in contenders
+            if not who["ours"]
+        ),
+    )
+
+
+def _table(summary: Row, sensor: str, kind: str) -> Table:
+    rows: list[tuple[Cell, ...]] = []
+    for who in summary["contenders"]:
+        measured = next(g for g in who["measured"] if (g["sensor"], g["kind"]) == (sensor, kind))
+        style = "ours" if who["key"] == "fused" else "number"
+        verdicts = [v for v in summary["verdicts"] if (v["contender"], v["sensor"]) == (who["key"], sensor)]
+        verdicts = [v for v in verdicts if v["movement"] in _movements(summary, sensor, kind)]
+        rows.append(
+            (
+                Cell(who["title"], ""),
+                *(Cell(number(measured[name]), style) for name, _ in _COLUMNS),
+                Cell(f"{sum(v['fused_wins'] for v in verdicts)} of {len(verdicts)}" if verdicts else ""),
+                Cell(f"{sum(v['fused_wins_when_published'] for v in verdicts)} of {len(verdicts)}" if verdicts else ""),
+                Cell(who["published"] if who["published"] != "none" else "", "published text"),
+            )
+        )
+    girdle = _movements(summary, sensor, kind)
+    turned = ", ".join(f"{name} {number(deg)}°" for name, deg in girdle.items())
+    return Table(
+        title=f"Mean over {_KINDS[kind]}, sensor {sensor}: errors (°)",
+        head=("contender", *(title for _, title in _COLUMNS), "fused wins", "when published", "its own publication"),
+        rows=tuple(rows),
+        note=f"The scapula turned by (RMS against the neutral posture, unseen by any encoder): {turned}.",
+    )
+
+
+def _movements(summary: Row, sensor: str, kind: str) -> dict[str, float]:
+    """Return the movements of a kind and by how much the scapula turned in each, degrees."""
+    return {r["movement"]: r["girdle_turn_deg"] for r in summary["rows"] if (r["sensor"], r["kind"]) == (sensor, kind)}
+
+
+def _by_movement(summary: Row, sensor: str) -> Table:
+    movements = list(dict.fromkeys(row["movement"] for row in summary["rows"] if row["sensor"] == sensor))
+    rows: list[tuple[Cell, ...]] = []
+    for who in summary["contenders"]:
+        style = "ours" if who["key"] == "fused" else "number"
+        mine = [row for row in summary["rows"] if (row["sensor"], row["contender"]) == (sensor, who["key"])]
+        cells = [Cell(who["title"], "")]
+        for movement in movements:
+            values = [
+                row["orientation_deg"] for row in mine if row["movement"] == movement and row["orientation_deg"] is not None
+            ]
+            cells.append(Cell(number(sum(values) / len(values) if values else None), style))
+        rows.append(tuple(cells))
+    return Table(
+        title=f"GH rotation by movement, sensor {sensor}: errors (°)",
+        head=("contender", *movements),
+        rows=tuple(rows),
+    )
+
+
+def _statements(summary: Row) -> tuple[Statement, ...]:
+    titles = {who["key"]: who["title"] for who in summary["contenders"]}
+    statements: list[Statement] = []
+    for key, title in titles.items():
+        mine = [v for v in summary["verdicts"] if v["contender"] == key]
+        if not mine:
+            continue
+        won = [v for v in mine if v["fused_wins"]]
+        evidence = "; ".join(f"{v['movement']} ({v['sensor']}): {v['verdict']}" for v in mine if not v["fused_wins"])
+        statements.append(Statement(f"against {title}: in {len(won)} of {len(mine)} rows", len(won) == len(mine), evidence))
+    return tuple(statements)

@@ -1,0 +1,70 @@
+"""The report's section on latency."""
+
+from pathlib import Path
+from typing import Any
+
+from ghest_rt.studies.report.page import Cell, Section, Table, figure_of, number
+
+Row = dict[str, Any]
+
+
+def latency_section(summary: Row, folder: Path) -> Section:
+    """Return the section.
+
+    Args:
+        summary: Summary of `study latency`.
+        folder: The study's folder.
+    """
+    path = folder / "figures" / "latency.png"
+    return Section(
+        key="latency",
+        title="Latency and prediction",
+        paragraphs=(
+            "Movements played slower and faster, every answer judged by where the arm is at the instant at which it is "
+            "published. A method that waits for its inputs is behind by its lag; fused forecasts to the instant of "
+            "publishing. “Behind the arm” is the slope of error against angular speed.",
+        ),
+        tables=(_candidates(summary), _speeds(summary)),
+        figures=(figure_of(path, "Error when published against the speed of the GH joint"),) if path.is_file() else (),
+    )
+
+
+def _candidates(summary: Row) -> Table:
+    return Table(
+        title="Answers when they are published",
+        head=("method", "lag (ms)", "newest image used (ms old)", "behind the arm (ms)", "error (° RMS)"),
+        rows=tuple(
+            (
+                Cell(who["title"], ""),
+                Cell(f"{who['lag_ms']:.0f}"),
+                Cell(number(max(who["age_ms"][camera] or 0.0 for camera in ("r0", "r1")))),
+                Cell(number(who["effective_delay_ms"]), _kind(who["key"])),
+                Cell(number(who["published_deg"]), _kind(who["key"])),
+            )
+            for who in summary["candidates"]
+        ),
+    )
+
+
+def _speeds(summary: Row) -> Table:
+    keys = {who["key"]: who["title"] for who in summary["candidates"]}
+    rows: list[tuple[Cell, ...]] = []
+    for movement, speed in dict.fromkeys((row["movement"], row["speed"]) for row in summary["rows"]):
+        there = {r["candidate"]: r for r in summary["rows"] if (r["movement"], r["speed"]) == (movement, speed)}
+        rows.append(
+            (
+                Cell(movement, ""),
+                Cell(f"×{speed:g}"),
+                Cell(number(there["fused"]["rms_speed_dps"])),
+                *(Cell(number(there[key]["published_deg"]), _kind(key)) for key in keys),
+            )
+        )
+    return Table(
+        title=f"Error when published (° RMS), sensor {summary['settings']['sensor']}",
+        head=("movement", "speed", "GH joint (°/s RMS)", *keys.values()),
+        rows=tuple(rows),
+    )
+
+
+def _kind(key: str) -> str:
+    return "ours" if key == "fused" else "number"

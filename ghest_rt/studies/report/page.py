@@ -1,0 +1,137 @@
+"""What the report's page consists of, before it becomes HTML."""
+
+import base64
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from ghest_rt.errors import BadInputError
+
+
+@dataclass(frozen=True, slots=True)
+class Cell:
+    """A cell of a table.
+
+    Attributes:
+        text: What it says.
+        kind: "" for text, "number", "published" for the paper's or a rival's own figure, "ours" for method `fused`.
+    """
+
+    text: str
+    kind: str = "number"
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """A table.
+
+    Attributes:
+        title: Its caption.
+        head: Titles of the columns.
+        rows: Its cells.
+        groups: Titles over several columns, with their spans; may be empty.
+        note: What to know about it; may be empty.
+    """
+
+    title: str
+    head: tuple[str, ...]
+    rows: tuple[tuple[Cell, ...], ...]
+    groups: tuple[tuple[str, int], ...] = ()
+    note: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """A figure, in the page as data.
+
+    Attributes:
+        caption: What it shows.
+        data_uri: The picture.
+        folded: Whether it is shown only on request.
+    """
+
+    caption: str
+    data_uri: str
+    folded: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Statement:
+    """A statement with its verdict.
+
+    Attributes:
+        text: The statement.
+        holds: Whether it holds.
+        evidence: The figures behind the verdict.
+        explanation: Why.
+    """
+
+    text: str
+    holds: bool
+    evidence: str = ""
+    explanation: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class KeyFigure:
+    """A figure worth seeing first.
+
+    Attributes:
+        value: With its unit.
+        title: What it is.
+        beside: What to compare it with.
+    """
+
+    value: str
+    title: str
+    beside: str
+
+
+@dataclass(frozen=True, slots=True)
+class Section:
+    """A study.
+
+    Attributes:
+        key: Its name on the command line.
+        title: Its heading.
+        paragraphs: What was done.
+        tables: Its tables.
+        figures: Its figures.
+        statements_title: Heading of the statements.
+        statements: What was put to the test.
+        notes: Titled remarks, such as caveats: (title, text).
+        missing: Whether the study is not in the results folder.
+    """
+
+    key: str
+    title: str
+    paragraphs: tuple[str, ...] = ()
+    tables: tuple[Table, ...] = ()
+    figures: tuple[Figure, ...] = ()
+    statements_title: str = "Statements put to the test"
+    statements: tuple[Statement, ...] = ()
+    notes: tuple[tuple[str, str], ...] = field(default=())
+    missing: bool = False
+
+
+def figure_of(path: Path, caption: str, *, folded: bool = False) -> Figure:
+    """Return a PNG file as a figure.
+
+    Raises:
+        BadInputError: The file cannot be read.
+    """
+    try:
+        data = base64.b64encode(path.read_bytes()).decode("ascii")
+    except OSError as error:
+        raise BadInputError(f"{path}: cannot be read: {error.strerror or error}; run the study again") from error
+    return Figure(caption, f"data:image/png;base64,{data}", folded)
+
+
+def number(value: float | None, scale: float = 1.0) -> str:
+    """Return a number with three significant digits, or a dash."""
+    if value is None:
+        return "–"
+    scaled = scale * value
+    if abs(scaled) >= 100:
+        return f"{scaled:.0f}"
+    digits = 2 if abs(scaled) >= 1 else 3
+    return f"{scaled:.{digits}f}" if abs(scaled) < 10 else f"{scaled:.1f}"

@@ -1,0 +1,119 @@
+"""The report's section on sensitivity: Tables 3 and 4, Figures 14 to 17, and beyond."""
+
+from pathlib import Path
+from typing import Any
+
+from ghest_rt.studies.report.accuracy_section import statements_of
+from ghest_rt.studies.report.page import Cell, Figure, Section, Table, figure_of, number
+
+Row = dict[str, Any]
+
+
+def sensitivity_section(summary: Row, folder: Path) -> Section:
+    """Return the section.
+
+    Args:
+        summary: Summary of `study sensitivity`.
+        folder: The study's folder.
+    """
+    largest = summary["at_largest"]
+    shifts = [row for row in largest if row["group"] == "shift"]
+    further = [row for row in largest if row["group"] != "shift"]
+    tables = [_mean_table(summary), _shift_table(shifts)]
+    if further:
+        tables.append(_further_table(further))
+    return Section(
+        key="sensitivity",
+        title="Sensitivity to markers that move and to wrong calibration",
+        paragraphs=(
+            "Each marker is really moved in the scene and rendered again, parameter by parameter (Table 3: q1 to q3 move "
+            "m0, q4 to q6 move m1), while the calibration stays as it was. Relative sensitivity S is equation (11): the "
+            "share by which the error grows for a share by which the parameter grows.",
+        ),
+        tables=tuple(tables),
+        figures=_figures(folder),
+        statements_title="The paper's statements on sensitivity",
+        statements=statements_of(summary),
+    )
+
+
+def _mean_table(summary: Row) -> Table:
+    undisturbed = {row["method"]: row for row in summary["undisturbed"]}
+    paper_deg = summary["paper"]["mean_orientation_deg_at_20_mm"]
+    return Table(
+        title="Mean over movements and q1 to q6",
+        head=("method", "undisturbed (°)", "marker displaced (°)", "by (mm)", "as published (°)"),
+        rows=tuple(
+            (
+                Cell(row["method"], ""),
+                Cell(number(undisturbed[row["method"]]["orientation_deg_rms"])),
+                Cell(number(row["orientation_deg"]), "ours" if row["method"] == "fused" else "number"),
+                Cell(number(row["amount_m"], 1e3)),
+                Cell(number(paper_deg) if row["method"] == "paper" else "", "published"),
+            )
+            for row in summary["mean_at_largest_shift"]
+        ),
+    )
+
+
+def _shift_table(shifts: list[Row]) -> Table:
+    methods = list(dict.fromkeys(row["method"] for row in shifts))
+    rows: list[tuple[Cell, ...]] = []
+    for parameter in dict.fromkeys(row["parameter"] for row in shifts):
+        of = {row["method"]: row for row in shifts if row["parameter"] == parameter}
+        first = of[methods[0]]
+        cells = [Cell(f"{parameter}: {first['what']} along {first['axis']}, {number(first['amount'], 1e3)} mm", "")]
+        for method in methods:
+            kind = "ours" if method == "fused" else "number"
+            cells += [
+                Cell(number(of[method]["position_m_rms"], 1e3), kind),
+                Cell(number(of[method]["orientation_deg_rms"]), kind),
+                Cell(number(of[method]["S_position"]), kind),
+                Cell(number(of[method]["S_orientation"]), kind),
+            ]
+        rows.append(tuple(cells))
+    return Table(
+        title="Errors and relative sensitivities at the largest translation, mean over movements",
+        head=("parameter", *("mm", "°", "S mm", "S °") * len(methods)),
+        rows=tuple(rows),
+        groups=(("", 1), *((method, 4) for method in methods)),
+    )
+
+
+def _further_table(further: list[Row]) -> Table:
+    methods = list(dict.fromkeys(row["method"] for row in further))
+    rows: list[tuple[Cell, ...]] = []
+    for parameter in dict.fromkeys(row["parameter"] for row in further):
+        of = {row["method"]: row for row in further if row["parameter"] == parameter}
+        first = of[methods[0]]
+        amount = f"{first['amount']:g}°" if first["unit"] == "deg" else f"{number(first['amount'], 1e3)} mm"
+        rows.append(
+            (
+                Cell(parameter.replace("_", " "), ""),
+                Cell(amount),
+                *(Cell(number(of[m]["orientation_deg_rms"]), "ours" if m == "fused" else "number") for m in methods),
+            )
+        )
+    return Table(
+        title="Beyond the paper: orientation error of the arm (°), mean over movements",
+        head=("disturbance", "amount", *methods),
+        rows=tuple(rows),
+    )
+
+
+def _figures(folder: Path) -> tuple[Figure, ...]:
+    figures: list[Figure] = []
+    for path in sorted((folder / "figures").glob("*.png"), key=lambda p: (not p.stem.startswith("drift"), p.stem)):
+        words = path.stem.split("_")
+        if path.stem == "drift_by_method":
+            figures.append(figure_of(path, "Errors against the translation of a marker, method by method"))
+        elif path.stem == "further":
+            figures.append(figure_of(path, "What the paper leaves out, at the largest amount"))
+        elif words[0] == "sobol":
+            caption = f"Sobol indices on a surrogate of the chain, {' '.join(words[1:])}"
+            figures.append(figure_of(path, caption, folded=words[-1] != "COMB"))
+        elif words[0].startswith("figure"):
+            name = words[0].replace("figure", "Figure ").strip()
+            caption = f"{name}: {' '.join(words[1:-1])}, method {words[-1]}"
+            figures.append(figure_of(path, caption, folded=words[-1] != "paper"))
+    return tuple(figures)
