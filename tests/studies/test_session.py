@@ -32,9 +32,7 @@ def judged(case: Scenario, *, base: bool = False) -> dict[str, dict[str, dict[st
 def test_in_memory_the_figures_are_those_of_score_on_a_recording(tmp_path: Path) -> None:
     path = tmp_path / "comb.mcap"
     shift = parse_shift("m1:x:0.01")
-    simulate(
-        SimulateOptions(out=path, movement="COMB", seed=3, duration_s=DURATION_S, marker_moves=(shift,)), lambda _: None
-    )
+    simulate(SimulateOptions(out=path, movement="COMB", seed=3, duration_s=DURATION_S, marker_moves=(shift,)), lambda _: None)
     here = judged(scenario(shifts=("m1:x:0.01",)), base=True)
     for method in METHODS:
         score = score_recording(path, method)

@@ -111,10 +111,11 @@ def _show(entries: list[dict[str, Any]], checks: list[dict[str, Any]], folder: P
 def _cell(entry: dict[str, Any], quantity: str) -> str:
     if entry["rms_low"] is None:
         return _number(entry["rms"], quantity)
-    return f"{_number(entry['rms'], quantity)} ± {_number((entry['rms_high'] - entry['rms_low']) / 2, quantity)}"
+    half = (entry["rms_high"] - entry["rms_low"]) / 2
+    return f"{_number(entry['rms'], quantity)}±{_number(half, quantity, digits=2)}"
 
 
-def _number(value: float | None, quantity: str) -> str:
+def _number(value: float | None, quantity: str, digits: int = 3) -> str:
     if value is None:
         return "-"
-    return f"{value if quantity.endswith('_deg') else 1e3 * value:.3f}"
+    return f"{value if quantity.endswith('_deg') else 1e3 * value:.{digits}g}"

@@ -11,8 +11,6 @@ from ghest_rt.studies.engine.salt import code_salt
 from ghest_rt.studies.engine.store import ResultStore
 from ghest_rt.studies.engine.task import Result, Task
 
-_CONNECT_S = 10.0
-
 
 @dataclass(frozen=True, slots=True)
 class ClusterExecutor:
@@ -20,9 +18,11 @@ class ClusterExecutor:
 
     Attributes:
         address: Of the scheduler, such as tcp://node1:8786.
+        connect_s: How long to wait for it.
     """
 
     address: str
+    connect_s: float = 10.0
 
     def run(self, jobs: Sequence[Job], store: ResultStore) -> Iterator[Outcome]:
         """Yield what became of each job as it ends.
@@ -33,13 +33,13 @@ class ClusterExecutor:
         """
         dask = _distributed()
         try:
-            client = dask.Client(self.address, timeout=_CONNECT_S, set_as_default=False)
+            client = dask.Client(self.address, timeout=self.connect_s, set_as_default=False)
         except (OSError, ValueError) as error:
             raise BadInputError(f"--scheduler {self.address}: no Dask scheduler answers there: {error}") from error
         with client:
             waiting = iter(jobs)
             under_way: dict[Any, Job] = {}
-            completed = dask.as_completed()
+            completed = dask.as_completed(loop=client.loop)
 
             def submit_next() -> None:
                 job = next(waiting, None)

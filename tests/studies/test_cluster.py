@@ -1,0 +1,45 @@
+"""A local cluster of two worker processes, one of which is killed half-way."""
+
+import os
+import signal
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from ghest_rt.studies.engine.cluster import ClusterExecutor
+from ghest_rt.studies.engine.run import run_tasks
+from ghest_rt.studies.engine.store import ResultStore
+from tests.studies.study_tasks import square_task
+
+distributed = pytest.importorskip("distributed")
+
+
+@pytest.fixture
+def cluster(tmp_path: Path) -> Iterator[Any]:
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=":0", local_directory=str(tmp_path / "dask")
+    ) as found:
+        yield found
+
+
+@pytest.mark.filterwarnings("ignore")  # Dask's own, about the worker that was killed
+def test_a_worker_killed_half_way_loses_no_result(cluster: Any, tmp_path: Path) -> None:
+    log, store = tmp_path / "log", ResultStore(tmp_path / "tasks")
+    base = square_task(10, log)
+    tasks = [square_task(n, log, needs=(base,), sleep_s=0.1) for n in range(24)]
+    pids = [worker.pid for worker in cluster.workers.values()]
+    assert len(set(pids)) == 2
+    killed: list[int] = []
+
+    def kill_one(done: float, total: float) -> None:
+        if done >= total / 2 and not killed:
+            worker = {int(line.split()[1]) for line in log.read_text().splitlines()} - {os.getpid()}
+            assert len(worker) == 2  # both took part
+            killed.append(worker.pop())
+            os.kill(killed[0], signal.SIGKILL)
+
+    found = run_tasks(tasks, store, ClusterExecutor(cluster.scheduler_address), kill_one)
+    assert killed
+    assert [value["found"] for value in found] == [n**2 + 100 for n in range(24)]

@@ -1,0 +1,104 @@
+"""The study engine: nothing run twice, nothing finished lost."""
+
+from pathlib import Path
+
+import pytest
+
+from ghest_rt.errors import BadInputError, GhestError
+from ghest_rt.studies.engine.cluster import ClusterExecutor
+from ghest_rt.studies.engine.local import LocalExecutor
+from ghest_rt.studies.engine.run import run_tasks, spent_cpu_s
+from ghest_rt.studies.engine.store import ResultStore
+from ghest_rt.studies.engine.task import Result, Task
+from tests.studies.study_tasks import square_task
+
+
+def runs(log: Path) -> list[str]:
+    return log.read_text().split()[::2] if log.exists() else []
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_values_come_in_the_order_asked_for_and_needs_first(tmp_path: Path, workers: int) -> None:
+    log, store = tmp_path / "log", ResultStore(tmp_path / "tasks")
+    base = square_task(3, log)
+    tasks = [square_task(n, log, needs=(base,)) for n in (1, 2, 4, 1)]
+    shares: list[float] = []
+    found = run_tasks(tasks, store, LocalExecutor(workers), lambda done, total: shares.append(done / total))
+    assert [value["found"] for value in found] == [10, 13, 25, 10]
+    assert runs(log)[0] == "3"
+    assert sorted(runs(log)) == ["1", "2", "3", "4"]
+    assert shares == sorted(shares)
+    assert shares[-1] == 1.0
+    assert spent_cpu_s(tasks, store) >= 0.0
+
+
+def test_what_is_there_is_not_run_again_and_an_interrupted_study_goes_on_where_it_was(tmp_path: Path) -> None:
+    log, store = tmp_path / "log", ResultStore(tmp_path / "tasks")
+    tasks = [square_task(n, log) for n in range(6)]
+    done = 0
+
+    def interrupt(_done: float, _total: float) -> None:
+        nonlocal done
+        done += 1
+        if done == 3:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run_tasks(tasks, store, LocalExecutor(1), interrupt)
+    before = runs(log)
+    assert len(before) == 3
+    assert [value["found"] for value in run_tasks(tasks, store, LocalExecutor(1))] == [0, 1, 4, 9, 16, 25]
+    assert sorted(runs(log)) == [str(n) for n in range(6)]
+
+
+def test_a_task_that_fails_is_named_and_the_others_are_kept(tmp_path: Path) -> None:
+    log, store = tmp_path / "log", ResultStore(tmp_path / "tasks")
+    tasks = [square_task(n, log) for n in (5, -1, 6)]
+    with pytest.raises(GhestError, match=r'1 of 3 tasks failed.*"n":-1.*ValueError: negative'):
+        run_tasks(tasks, store, LocalExecutor(1))
+    run_tasks([tasks[0], tasks[2]], store, LocalExecutor(1))
+    assert sorted(runs(log)) == ["-1", "5", "6"]
+
+
+def test_a_killed_worker_is_told_and_what_it_had_finished_is_kept(tmp_path: Path) -> None:
+    log, store, fuse = tmp_path / "log", ResultStore(tmp_path / "tasks"), tmp_path / "fuse"
+    fuse.touch()
+    tasks = [square_task(1, log), square_task(2, log), square_task(3, log, sleep_s=1.0, die_once=fuse)]
+    with pytest.raises(GhestError, match="run the same command again"):
+        run_tasks(tasks, store, LocalExecutor(2))
+    assert [value["found"] for value in run_tasks(tasks, store, LocalExecutor(2))] == [1, 4, 9]
+    assert sorted(runs(log)) == ["1", "2", "3"]
+
+
+def test_the_key_depends_on_parameters_needs_and_code_but_not_on_the_cost() -> None:
+    def salt(kind: str) -> str:
+        return f"code of {kind}"
+
+    task = Task.of("a:b", {"x": 1, "y": [2]}, cost=3.0)
+    assert task.key(salt) == Task.of("a:b", {"y": [2], "x": 1}).key(salt)
+    others = [
+        Task.of("a:b", {"x": 2, "y": [2]}),
+        Task.of("a:c", {"x": 1, "y": [2]}),
+        Task.of("a:b", {"x": 1, "y": [2]}, needs=(task,)),
+    ]
+    assert len({other.key(salt) for other in (task, *others)}) == 4
+    assert task.key(salt) != task.key(lambda kind: f"newer code of {kind}")
+
+
+def test_results_appear_whole_or_not_at_all(tmp_path: Path) -> None:
+    store = ResultStore(tmp_path)
+    store.save("k", Result({"a": [1.5, None]}), 0.25)
+    assert store.values("k") == {"a": [1.5, None]}
+    assert store.cpu_s("k") == 0.25
+    (tmp_path / "other.npz").touch()  # arrays written, then killed
+    assert not store.has("other")
+    assert [path.name for path in tmp_path.iterdir() if path.name.startswith(".")] == []
+    (tmp_path / "file").touch()
+    with pytest.raises(GhestError, match="cannot be kept"):
+        ResultStore(tmp_path / "file" / "below").save("k", Result({}), 0.0)
+
+
+def test_without_a_scheduler_the_address_is_told(tmp_path: Path) -> None:
+    executor = ClusterExecutor("tcp://127.0.0.1:1", connect_s=0.5)
+    with pytest.raises(BadInputError, match="no Dask scheduler answers"):
+        run_tasks([square_task(1, tmp_path / "log")], ResultStore(tmp_path / "tasks"), executor)
