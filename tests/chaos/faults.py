@@ -167,13 +167,14 @@ def _subscriber_stuck(rig: ChaosRig) -> Window:
         other.communicate()
 
 
-def _wall_clock(text: str) -> Inflict:
+def _wall_clock(offset_s: float = 0.0, slew_ppm: float = 0.0) -> Inflict:
     def turn(rig: ChaosRig) -> Window:
+        assert rig.wall_clock is not None
         window = window_from_now(0.0)
-        rig.set_wall_clock(text)
-        time.sleep(3.0)  # read anew once a second
-        rig.set_wall_clock("+0")
+        rig.wall_clock.turn(offset_s, slew_ppm)
         time.sleep(1.5)
+        rig.wall_clock.turn()
+        time.sleep(0.5)
         return Window((), "", window.from_ns, time.monotonic_ns())
 
     return turn
@@ -190,9 +191,9 @@ CHAOS = (
     Chaos("processors starved: four busy processes per core", _starved),
     Chaos("no memory to be had (RLIMIT_AS)", _short_of_memory),
     Chaos("another subscriber stuck (SIGSTOP)", _subscriber_stuck, seen_through=True),
-    Chaos("wall clock steps by an hour and back", _wall_clock("+3600"), "wall clock", seen_through=True),
-    Chaos("wall clock steps back by a day and forth", _wall_clock("-86400"), "wall clock", seen_through=True),
-    Chaos("wall clock slews by 500 ppm", _wall_clock("+0 x1.0005"), "wall clock", seen_through=True),
+    Chaos("wall clock steps by an hour and back", _wall_clock(3600.0), "wall clock", seen_through=True),
+    Chaos("wall clock steps back by a day and forth", _wall_clock(-86400.0), "wall clock", seen_through=True),
+    Chaos("wall clock slews by 500 ppm", _wall_clock(slew_ppm=500.0), "wall clock", seen_through=True),
     Chaos("disk full while recording", _disk_full, "recording", seen_through=True),
     Chaos("Zenoh router killed, back after 1 s", _router_restarted, "routed"),
 )

@@ -1,4 +1,4 @@
-"""What systemd does with the unit: readiness, watchdog, abort, restart, with the unit's own times; a real notification socket."""
+"""What systemd does with the unit: readiness, watchdog, abort, restart, with its own times; on a real notification socket."""
 
 import contextlib
 import os

@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from tests.chaos.manager import Manager
+from tests.chaos.wall_clock import WallClock
 from tests.hil.injection import FILE, Window
 from tests.hil.rig import ROOT, Rig, Subscriber, far_ends, free_endpoint, service_command
 from tests.hil.scene import read_scene, write_scene
@@ -18,8 +19,6 @@ from tests.hil.service import HANGS
 
 RIG = "realsense-serial"
 _START_S = 90.0
-_FAKETIME = tuple(Path("/usr/lib").glob("*/faketime/libfaketime.so.1"))
-_CLOCK_FILE = "wall-clock"
 
 _ROUTER = """
 import sys, time
@@ -28,11 +27,6 @@ session, _ = open_session(listen=(sys.argv[1],), mode="router")
 print("ready", flush=True)
 time.sleep(1e6)
 """
-
-
-def can_fake_the_wall_clock() -> bool:
-    """Whether libfaketime is installed (apt install libfaketime)."""
-    return bool(_FAKETIME)
 
 
 class Router:
@@ -65,10 +59,19 @@ class ChaosRig(Rig):
         folder: Of everything the fixtures share.
         endpoint: Where subscribers connect.
         router: Between service and subscriber; None if there is none.
+        wall_clock: Of the service; None if it has the machine's.
     """
 
     def __init__(
-        self, manager: Manager, subscriber: Subscriber, folder: Path, *, talker_pid: int, endpoint: str, router: Router | None
+        self,
+        manager: Manager,
+        subscriber: Subscriber,
+        folder: Path,
+        *,
+        talker_pid: int,
+        endpoint: str,
+        router: Router | None,
+        wall_clock: WallClock | None,
     ) -> None:
         super().__init__(RIG, manager, subscriber, folder, read_scene(folder))  # type: ignore[arg-type]
         self.manager = manager
@@ -76,17 +79,11 @@ class ChaosRig(Rig):
         self.folder = folder
         self.endpoint = endpoint
         self.router = router
-
-    def set_wall_clock(self, text: str) -> None:
-        """Turn CLOCK_REALTIME of the service's processes: libfaketime's language, "+3600" or "+0 x1.0005"."""
-        path = self.folder / _CLOCK_FILE
-        new = path.with_suffix(".new")
-        new.write_text(text + "\n")
-        new.replace(path)
+        self.wall_clock = wall_clock
 
 
 @contextmanager
-def chaos_rig(folder: Path, *, record: bool = False, routed: bool = False, fake_wall_clock: bool = False) -> Iterator[ChaosRig]:
+def chaos_rig(folder: Path, *, record: bool = False, routed: bool = False, own_wall_clock: bool = False) -> Iterator[ChaosRig]:
     """Run the service; with a recorder, behind a router, or with a wall clock that can be turned."""
     if not (folder / "scene.npz").exists():
         write_scene(folder, time.monotonic_ns())
@@ -95,14 +92,10 @@ def chaos_rig(folder: Path, *, record: bool = False, routed: bool = False, fake_
     with contextlib.ExitStack() as stack:
         station, environment, talker_pid = stack.enter_context(far_ends(RIG, folder))
         environment[HANGS] = "1"
-        if fake_wall_clock:
-            (folder / _CLOCK_FILE).write_text("+0\n")
-            environment |= {
-                "LD_PRELOAD": str(_FAKETIME[0]),
-                "FAKETIME_TIMESTAMP_FILE": str(folder / _CLOCK_FILE),
-                "FAKETIME_DONT_FAKE_MONOTONIC": "1",
-                "FAKETIME_CACHE_DURATION": "1",
-            }
+        wall_clock = None
+        if own_wall_clock:
+            wall_clock = WallClock(folder)
+            environment |= wall_clock.environment
         listen = endpoint = free_endpoint()
         router = Router() if routed else None
         if router is not None:
@@ -115,9 +108,11 @@ def chaos_rig(folder: Path, *, record: bool = False, routed: bool = False, fake_
         manager = stack.enter_context(Manager(command, environment, ROOT, folder, output))
         subscriber = Subscriber(endpoint, mode="peer" if router is None else "client")
         stack.callback(subscriber.close)
-        rig = ChaosRig(manager, subscriber, folder, talker_pid=talker_pid, endpoint=endpoint, router=router)
+        rig = ChaosRig(
+            manager, subscriber, folder, talker_pid=talker_pid, endpoint=endpoint, router=router, wall_clock=wall_clock
+        )
         if not rig.wait_valid(20, _START_S):
-            raise RuntimeError(f"no valid angles within {_START_S:g} s:\n{rig.log()}")
+            raise RuntimeError(f"no valid angles within {_START_S:g} s:\n{rig.log()[-3000:]}")
         yield rig
 
 

@@ -1,19 +1,12 @@
-"""Injects every fault into a running service and measures what the subscriber sees.
+"""Injects every fault of a device into a running service and measures what the subscriber sees; `python -m tests.chaos.run`."""
 
-`python -m tests.hil.faults [--out docs/faults.md]` prints the table, and writes it into the document.
-"""
-
-import argparse
-import sys
-import tempfile
 import time
 from collections import Counter
 from dataclasses import dataclass
 from itertools import pairwise
-from pathlib import Path
 
 from tests.hil.injection import Window
-from tests.hil.rig import FIXTURES, Rig, Sample, fixture_rig
+from tests.hil.rig import Rig, Sample
 
 BOTH = ("realsense-serial", "oak-can")
 WRONG_DEG = 2.0  # an angle further off than this is not the truth of its instant
@@ -21,7 +14,6 @@ _SETTLED = 20  # valid samples in a row
 _SILENCE_NS = 200_000_000  # a subscriber to whom nothing comes for so long knows that something is wrong
 _RATE_HZ = 66.6
 _RECOVERY_S = 15.0
-_MARKER = "<!-- table -->"
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,12 +166,6 @@ def _error_deg(rig: Rig, sample: Sample) -> float:
     return rig.scene.error_deg(sample.body["t_sample_ns"], sample.body["quaternion_wxyz"])
 
 
-def measure_all(name: str, folder: Path) -> list[Seen]:
-    """Run the service on fixtures and go through its faults one after the other."""
-    with fixture_rig(name, folder) as rig:
-        return [measure(rig, fault) for fault in FAULTS if name in fault.rigs]
-
-
 def table(results: list[Seen]) -> str:
     """Return the results as a Markdown table."""
     lines = [
@@ -200,25 +186,3 @@ def table(results: list[Seen]) -> str:
             f"| {seen.lost} | {seen.worst_deg:.2f} | {seen.stale} |"
         )
     return "\n".join(lines) + "\n"
-
-
-def main() -> None:
-    """Measure on all fixtures, print and write the table."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--out", type=Path, help="document whose table is replaced, below the line that marks its place")
-    parser.add_argument("--rig", choices=FIXTURES, action="append", help="only these fixtures")
-    arguments = parser.parse_args()
-    results: list[Seen] = []
-    with tempfile.TemporaryDirectory(prefix="hil-") as folder:
-        for name in arguments.rig or FIXTURES:
-            results += measure_all(name, Path(folder))
-    text = table(results)
-    sys.stdout.write(text)
-    if arguments.out is not None:
-        head, marker, _ = arguments.out.read_text().partition(_MARKER)
-        arguments.out.write_text(f"{head}{marker or _MARKER}\n\n{text}")
-    sys.exit(1 if sum(seen.stale for seen in results) else 0)
-
-
-if __name__ == "__main__":
-    main()

@@ -80,6 +80,13 @@ class Subscriber:
         """Samples published in a time window."""
         return [sample for sample in list(self.angles) if from_ns <= sample.body["t_publish_ns"] < until_ns]
 
+    def take_angles(self) -> list[Sample]:
+        """Return what has come and forget it: for runs that would fill the memory."""
+        with self._changed:
+            taken = self.angles[:]
+            self.angles.clear()
+        return taken
+
     def close(self) -> None:
         self._session.close()
 
