@@ -51,7 +51,7 @@ def _table(entries: list[Row], sensor: str, title: str, quantities: tuple[tuple[
     published = any(entry["paper_rms"] is not None for entry in here)
     rows: list[tuple[Cell, ...]] = []
     for movement in dict.fromkeys(entry["movement"] for entry in here):
-        cells = [Cell("mean of the movements" if movement == "mean" else movement, "")]
+        cells = [Cell("mean" if movement == "mean" else movement, "")]
         for quantity, _, scale in quantities:
             found = {e["method"]: e for e in here if (e["movement"], e["quantity"]) == (movement, quantity)}
             if published:

@@ -50,8 +50,9 @@ def compare_section(summary: Row, folder: Path) -> Section:
         figures=tuple(figures),
         statements_title="Does fused win?",
         statements=_statements(summary),
+        badges=("always", "not always"),
         notes=tuple(
-            (who["title"], f"{who['source']}. Its own publication: {who['published']}. To bear in mind: {who['caveat']}.")
+            (who["title"], f"After {who['source']}. Its own publication: {who['published']}. To bear in mind: {who['caveat']}.")
             for who in contenders
             if not who["ours"]
         ),
@@ -71,14 +72,14 @@ def _table(summary: Row, sensor: str, kind: str) -> Table:
                 *(Cell(number(measured[name]), style) for name, _ in _COLUMNS),
                 Cell(f"{sum(v['fused_wins'] for v in verdicts)} of {len(verdicts)}" if verdicts else ""),
                 Cell(f"{sum(v['fused_wins_when_published'] for v in verdicts)} of {len(verdicts)}" if verdicts else ""),
-                Cell(who["published"] if who["published"] != "none" else "", "published text"),
+                Cell(who["published_short"], "published"),
             )
         )
     girdle = _movements(summary, sensor, kind)
     turned = ", ".join(f"{name} {number(deg)}°" for name, deg in girdle.items())
     return Table(
         title=f"Mean over {_KINDS[kind]}, sensor {sensor}: errors (°)",
-        head=("contender", *(title for _, title in _COLUMNS), "fused wins", "when published", "its own publication"),
+        head=("contender", *(title for _, title in _COLUMNS), "fused wins", "… when published", "its own publication"),
         rows=tuple(rows),
         note=f"The scapula turned by (RMS against the neutral posture, unseen by any encoder): {turned}.",
     )

@@ -1,7 +1,7 @@
 """What the report's page consists of, before it becomes HTML."""
 
 import base64
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 from ghest_rt.errors import BadInputError
@@ -98,6 +98,7 @@ class Section:
         figures: Its figures.
         statements_title: Heading of the statements.
         statements: What was put to the test.
+        badges: The words for a statement that holds, and for one that does not.
         notes: Titled remarks, such as caveats: (title, text).
         missing: Whether the study is not in the results folder.
     """
@@ -109,7 +110,8 @@ class Section:
     figures: tuple[Figure, ...] = ()
     statements_title: str = "Statements put to the test"
     statements: tuple[Statement, ...] = ()
-    notes: tuple[tuple[str, str], ...] = field(default=())
+    badges: tuple[str, str] = ("holds", "does not")
+    notes: tuple[tuple[str, str], ...] = ()
     missing: bool = False
 
 

@@ -12,6 +12,7 @@ class Contender:
         title: Its name for readers.
         source: The publication it follows.
         published: What that publication reports.
+        published_short: The same in a few words, degrees.
         published_deg: The figure to set beside ours, degrees; None where no single one fits.
         lag_ms: How long after an instant its answer is published; None where the station file says.
         caveat: What makes the two figures incomparable, or favours one side.
@@ -23,6 +24,7 @@ class Contender:
     title: str
     source: str
     published: str
+    published_short: str
     published_deg: float | None
     lag_ms: float | None
     caveat: str
@@ -42,6 +44,7 @@ CONTENDERS = {
             title="exoskeleton joints alone",
             source="practice of the paper's [10-13]: SAA = j0 + j1, SFE = j2, SIER = j6",
             published=f"SFE 8.4, SAA 8.2, SIER 16.2 deg RMS ({_REAL_PEOPLE})",
+            published_short="SFE 8.4, SAA 8.2, SIER 16.2",
             published_deg=None,
             lag_ms=20.0,
             caveat=(
@@ -55,6 +58,7 @@ CONTENDERS = {
             title="coupled-chain IK (EIKPE)",
             source="the paper's [16], inverse kinematics of limb and exoskeleton as one closed chain",
             published=f"SFE 3.9, SAA 3.3, SIER 6.5 deg RMS ({_REAL_PEOPLE})",
+            published_short="SFE 3.9, SAA 3.3, SIER 6.5",
             published_deg=None,
             lag_ms=20.0,
             caveat=(
@@ -68,6 +72,7 @@ CONTENDERS = {
             title="swivel angle, palm to head",
             source="the paper's [18, 19], redundancy criterion of Kim et al., IEEE TBME 59 (2012) 1770",
             published="swivel angle alone, reaching movements without exoskeleton: mean error below 5 deg",
+            published_short="swivel angle < 5",
             published_deg=None,
             lag_ms=20.0,
             caveat=(
@@ -81,6 +86,7 @@ CONTENDERS = {
             title="swivel angle with the wrist",
             source="the paper's [17, 20]; offset for the wrist's orientation of Kim and Rosen, J. Intell. Robot. Syst. 2015",
             published="GH angles 4.8 deg RMSE in the best case, swivel angle 10 deg RMSE over all tasks ([20] by section 4.4)",
+            published_short="4.8 (best case)",
             published_deg=4.8,
             lag_ms=20.0,
             caveat=(
@@ -94,6 +100,7 @@ CONTENDERS = {
             title="ArUco, OpenCV's defaults",
             source="Garrido-Jurado et al. 2014, OpenCV; markers as large as the disks' square, colour images only",
             published="none for GH angles",
+            published_short="",
             published_deg=None,
             lag_ms=None,
             caveat="everything behind the markers is this system's: the same cameras, calibration and estimator as `refined`",
@@ -104,6 +111,7 @@ CONTENDERS = {
             title="ArUco, sub-pixel corners",
             source="the same with CORNER_REFINE_SUBPIX: the fair one",
             published="none for GH angles",
+            published_short="",
             published_deg=None,
             lag_ms=None,
             caveat="as above",
@@ -114,6 +122,7 @@ CONTENDERS = {
             title="inertial sensors (imufusion)",
             source="Madgwick's filter (imufusion), gyroscopes and accelerometers, without magnetometers near motors",
             published="OpenSenseRT (2021): 5.6 deg, eight upper-limb angles at 30 Hz; 3 deg RMS dynamic (the paper's [5])",
+            published_short="5.6",
             published_deg=5.6,
             lag_ms=15.0,
             caveat=(
@@ -127,6 +136,7 @@ CONTENDERS = {
             title="the paper's method",
             source=_PAPER,
             published="0.9 deg mean RMSE, simulated (Tables 6 and 7); 3.6 deg with markers displaced by 20 mm",
+            published_short="0.9",
             published_deg=0.889,
             lag_ms=None,
             caveat="same calibration and optics as `fused`",
@@ -138,6 +148,7 @@ CONTENDERS = {
             title="refined",
             source="docs/vision.md",
             published="none",
+            published_short="",
             published_deg=None,
             lag_ms=None,
             caveat="answers 45 ms late, when all its inputs are there on both sides of the instant",
@@ -149,6 +160,7 @@ CONTENDERS = {
             title="fused",
             source="docs/fused-estimator.md",
             published="none",
+            published_short="",
             published_deg=None,
             lag_ms=0.0,
             caveat="answers for the instant of publishing",
