@@ -12,6 +12,9 @@ from ghest_rt.geometry.so3 import Array, log_so3, matrix_from_quat_wxyz, quat_wx
 from ghest_rt.messages.results import GhEstimate, MarkerObservation, Reason, TruthSample
 from ghest_rt.studies.rivals.encoder_only import orientation_only
 
+RECOMMENDED_GAIN = 0.5
+"""The library's own."""
+
 _G_MPS2 = 9.80665
 # Rows: the axes of imufusion's earth (X level, ahead of the patient; Y to the left; Z up) in E.
 EARTH_FROM_E = np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
@@ -100,10 +103,17 @@ class InertialEstimator:
     """A `GhEstimator` from two inertial sensors, without magnetometers: motors and steel of an exoskeleton disturb these.
 
     Both attitudes are given at the start, and so is how each sensor sits on its bone; from then on the filter is on its own.
-    Its gain and rejections are the library's recommended ones.
+    Rejections are the library's recommended ones, and so is the gain unless told otherwise.
     """
 
-    def __init__(self, scapula: ImuTrack, arm: ImuTrack, gh_from_scapula_sensor: Array, arm_from_arm_sensor: Array) -> None:
+    def __init__(
+        self,
+        scapula: ImuTrack,
+        arm: ImuTrack,
+        gh_from_scapula_sensor: Array,
+        arm_from_arm_sensor: Array,
+        gain: float = RECOMMENDED_GAIN,
+    ) -> None:
         """Set the filters on the initial attitudes.
 
         Args:
@@ -111,11 +121,12 @@ class InertialEstimator:
             arm: The sensor on the upper arm.
             gh_from_scapula_sensor: (3, 3) that sensor's rotation in the GH frame.
             arm_from_arm_sensor: (3, 3) the other's in the arm frame.
+            gain: How strongly the accelerometers correct the gyroscopes; 0 leaves them alone.
 
         Raises:
             GhestError: imufusion is not installed.
         """
-        self._filters = (_Attitude(scapula), _Attitude(arm))
+        self._filters = (_Attitude(scapula, gain), _Attitude(arm, gain))
         self._gh_from_scapula = gh_from_scapula_sensor
         self._arm_from_sensor = arm_from_arm_sensor
 
@@ -141,7 +152,7 @@ class InertialEstimator:
 class _Attitude:
     """One sensor's filter, stepped up to the instants asked for."""
 
-    def __init__(self, track: ImuTrack) -> None:
+    def __init__(self, track: ImuTrack, gain: float) -> None:
         try:
             import imufusion  # noqa: PLC0415 - an extra, imported only when used
         except ImportError as error:
@@ -153,7 +164,7 @@ class _Attitude:
         self._ahrs = imufusion.Ahrs()
         settings = imufusion.AhrsSettings()
         settings.sample_rate = rate_hz
-        settings.gain = 0.5
+        settings.gain = gain
         settings.acceleration_rejection = 10.0
         settings.rejection_timeout = 5 * rate_hz
         self._ahrs.set_settings(settings)

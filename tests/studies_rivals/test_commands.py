@@ -1,0 +1,59 @@
+"""`study compare` and `study latency` as a user runs them."""
+
+import json
+from pathlib import Path
+
+import pyarrow.parquet as pq
+import pytest
+from typer.testing import CliRunner
+
+from ghest_rt.cli.main import app
+from ghest_rt.studies.rivals.contenders import CONTENDERS
+
+
+def run(*words: str) -> dict[str, object]:
+    result = CliRunner().invoke(app, ["study", *words, "--json"])
+    assert result.exit_code == 0, result.output
+    document: dict[str, object] = json.loads(result.stdout)
+    return document
+
+
+@pytest.mark.slow
+def test_compare_puts_every_contender_on_the_same_session(tmp_path: Path) -> None:
+    document = run("compare", "--quick", "--workers", "1", "--out", str(tmp_path))
+    rows = {row["contender"]: row for row in document["rows"]}  # type: ignore[attr-defined]
+    assert set(rows) == set(CONTENDERS)
+    assert len({row["samples"] for row in rows.values()}) == 1
+    assert all(row["answered_fraction"] > 0.9 for row in rows.values())
+    for rival in ("exoskeleton", "coupled_chain", "swivel", "swivel_wrist", "aruco", "aruco_subpixel", "paper"):
+        assert rows["fused"]["orientation_deg"] < rows[rival]["orientation_deg"]
+    assert rows["aruco_subpixel"]["orientation_deg"] < rows["aruco"]["orientation_deg"]
+    assert rows["fused"]["published_deg"] < rows["refined"]["published_deg"]
+    verdicts = {v["contender"]: v for v in document["verdicts"]}  # type: ignore[attr-defined]
+    assert set(verdicts) == set(CONTENDERS) - {"fused"}
+    assert all(v["verdict"] for v in verdicts.values())
+    folder = tmp_path / "compare"
+    assert json.loads((folder / "summary.json").read_text()) == document
+    assert pq.read_table(folder / "rows.parquet").num_rows == len(CONTENDERS)
+    for name in ("contenders_paper", "angles_paper"):
+        assert all((folder / "figures" / f"{name}{ending}").stat().st_size > 1000 for ending in (".png", ".svg", ".pdf"))
+
+
+@pytest.mark.slow
+def test_latency_grows_with_speed_for_who_waits_and_hardly_for_who_forecasts(tmp_path: Path) -> None:
+    document = run("latency", "--quick", "--workers", "1", "--out", str(tmp_path))
+    who = {row["key"]: row for row in document["candidates"]}  # type: ignore[attr-defined]
+    assert (who["refined"]["lag_ms"], who["fused"]["lag_ms"]) == (45.0, 0.0)
+    assert who["refined"]["effective_delay_ms"] == pytest.approx(45.0, abs=6.0)
+    assert who["paper_at_once"]["effective_delay_ms"] == pytest.approx(15.0, abs=5.0)  # a frame period
+    assert who["fused"]["effective_delay_ms"] < 2.0
+    rows = {(row["candidate"], row["speed"]): row for row in document["rows"]}  # type: ignore[attr-defined]
+    assert rows["refined", 3.0]["published_deg"] > 2.0 * rows["refined", 1.0]["published_deg"]
+    assert rows["fused", 3.0]["rms_speed_dps"] == pytest.approx(3.0 * rows["fused", 1.0]["rms_speed_dps"], rel=0.05)
+    assert (tmp_path / "latency" / "figures" / "latency.svg").is_file()
+
+
+def test_a_motion_file_that_is_not_there_is_named(tmp_path: Path) -> None:
+    result = CliRunner().invoke(app, ["study", "compare", "--motion", str(tmp_path / "no.mot"), "--out", str(tmp_path)])
+    assert result.exit_code != 0
+    assert "no.mot" in str(result.exception)
