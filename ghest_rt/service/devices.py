@@ -56,7 +56,7 @@ def _camera(name: str, camera: Camera, station: LoadedStation, clock: Clock, sim
     device = camera.device
     if isinstance(device, SimBackend):
         return make_camera("sim", name, clock, sim_settings)
-    settings = device.model_dump(exclude={"backend"})
+    settings = device.model_dump(exclude={"backend"}) | {"depth": camera.depth}
     if isinstance(device, RealsenseBagBackend):
         settings["path"] = str(Path(station.source).parent / device.path)
     return make_camera(device.backend, name, clock, settings)

@@ -50,9 +50,10 @@ class HostSource:
         pipeline = dai.Pipeline(createImplicitDevice=False)
         sync = pipeline.create(dai.node.Sync)
         self.color = sync.inputs["color"].createInputQueue()
-        self.depth = sync.inputs["depth"].createInputQueue()
+        if settings.depth:
+            self.depth = sync.inputs["depth"].createInputQueue()
         self.started = dai.Clock.now()
-        self.send(0)
+        self.send(0, streams="cd" if settings.depth else "c")
         return Images(pipeline, "OAK-D-SR", "1844"), sync
 
     def send(self, k: int, *, skew: timedelta = timedelta(), streams: str = "cd") -> None:

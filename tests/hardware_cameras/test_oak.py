@@ -57,6 +57,22 @@ def test_images_arrive_unchanged_with_calibration_and_times(camera: OakCamera, s
     np.testing.assert_array_equal(info.color_from_depth, np.eye(4))
 
 
+def test_without_depth_every_colour_image_is_a_frame(source: HostSource) -> None:
+    camera = OakCamera("r1", source, replace(SETTINGS, depth=False), MonotonicClock())
+    camera.open()
+    try:
+        for k in (1, 2):
+            source.send(k, streams="c")
+        frames = [camera.read(_LONG_S) for _ in range(3)]
+    finally:
+        camera.close()
+    for k, frame in enumerate(frames):
+        np.testing.assert_array_equal(frame.color_rgb, color_of(k))
+        assert frame.depth_counts is None
+        assert frame.t_depth_capture_ns == frame.t_capture_ns
+    assert camera.stats.delivered == 3
+
+
 def test_only_images_of_the_same_instant_are_paired(camera: OakCamera, source: HostSource) -> None:
     camera.open()
     source.send(1, streams="c")  # its depth image is lost

@@ -60,6 +60,27 @@ def test_images_arrive_unchanged_and_paired(rig: Rig) -> None:
         assert frame.t_arrival_ns == 6_000_000_000 + k * PERIOD_NS
 
 
+def test_without_depth_colour_images_leave_at_once() -> None:
+    rig = Rig(replace(SETTINGS, depth=False))
+    rig.camera.open()
+    for k in range(3):
+        rig.clock.sleep_until_ns(6_000_000_000 + k * PERIOD_NS)
+        rig.send(k, 1_000_000_000 + k * PERIOD_NS, streams="c")
+        (frame,) = rig.read_all()
+        assert frame.depth_counts is None
+        np.testing.assert_array_equal(frame.color_rgb, color_of(k))
+        assert frame.t_arrival_ns == 6_000_000_000 + k * PERIOD_NS
+    assert rig.camera.info.depth == rig.camera.info.color
+    assert rig.camera.stats.without_depth == 0
+    rig.camera.close()
+
+
+def test_without_depth_settings_of_depth_are_refused() -> None:
+    rig = Rig(replace(SETTINGS, depth=False, laser_power=3.0))
+    with pytest.raises(DriverError, match="need depth"):
+        rig.camera.open()
+
+
 def test_frames_are_stamped_with_device_time_and_not_with_their_arrival(rig: Rig) -> None:
     rng = np.random.default_rng(1)
     host_minus_device_ns = 3_000_000_000

@@ -48,6 +48,7 @@ class _Session:
         self._name = name
         self._source = source
         self._clock = clock
+        self._with_depth = settings.depth
         self._queue = FrameQueue(settings.queue_frames, stats)
         self._closing = threading.Event()
         self._pump: threading.Thread | None = None
@@ -125,8 +126,8 @@ class _Session:
         t_arrival_ns = self._clock.now_ns()
         if not isinstance(group, dai.MessageGroup):
             raise BadDeviceData(f"camera {self._name}: expected a group of images, got {type(group).__name__}")
-        color, depth = group["color"], group["depth"]
-        if not (isinstance(color, dai.ImgFrame) and isinstance(depth, dai.ImgFrame)):
+        color, depth = group["color"], group["depth"] if self._with_depth else None
+        if not (isinstance(color, dai.ImgFrame) and (depth is None or isinstance(depth, dai.ImgFrame))):
             raise BadDeviceData(f"camera {self._name}: expected images, got {type(color).__name__}, {type(depth).__name__}")
         return self._converter.convert(color, depth, t_arrival_ns)
 

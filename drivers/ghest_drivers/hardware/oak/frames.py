@@ -48,7 +48,7 @@ class GroupConverter:
         self._stats = stats
         self._last_capture_ns: int | None = None
 
-    def convert(self, color: "dai.ImgFrame", depth: "dai.ImgFrame", t_arrival_ns: int) -> RgbdFrame | None:
+    def convert(self, color: "dai.ImgFrame", depth: "dai.ImgFrame | None", t_arrival_ns: int) -> RgbdFrame | None:
         """Return the frame; None, counted, if its time is not believable or not later than the last one's.
 
         Raises:
@@ -67,7 +67,7 @@ class GroupConverter:
         if not self._calibrated:
             self._calibrate(color, depth)
         self._stats.delivered += 1
-        between_ns = nanoseconds(_middle(depth)) - nanoseconds(_middle(color))
+        between_ns = 0 if depth is None else nanoseconds(_middle(depth)) - nanoseconds(_middle(color))
         return RgbdFrame(
             info=self._info,
             seq=seq,
@@ -85,12 +85,16 @@ class GroupConverter:
         t_capture_ns = nanoseconds(_middle(color)) + self._host_offset_ns
         return t_capture_ns if 0 <= t_arrival_ns - t_capture_ns <= _MAX_AGE_NS else fitted_ns
 
-    def _images(self, color: "dai.ImgFrame", depth: "dai.ImgFrame") -> tuple[NDArray[np.uint8], NDArray[np.uint16]]:
+    def _images(
+        self, color: "dai.ImgFrame", depth: "dai.ImgFrame | None"
+    ) -> tuple[NDArray[np.uint8], NDArray[np.uint16] | None]:
         expected = (self._info.color.height_px, self._info.color.width_px)
         for what, image, wanted in (
             ("colour", color, dai.ImgFrame.Type.RGB888i),
             ("depth", depth, dai.ImgFrame.Type.RAW16),
         ):
+            if image is None:
+                continue
             size = (image.getHeight(), image.getWidth())
             if image.getType() != wanted or size != expected:
                 self._stats.bad += 1
@@ -98,10 +102,11 @@ class GroupConverter:
                     f"camera {self._info.name}: {what} image {image.getSequenceNum()} is {image.getType().name} {size}, "
                     f"not {wanted.name} {expected}"
                 )
-        return _pixels(color, (*expected, 3), np.dtype(np.uint8)), _pixels(depth, expected, np.dtype(np.uint16))
+        depth_counts = None if depth is None else _pixels(depth, expected, np.dtype(np.uint16))
+        return _pixels(color, (*expected, 3), np.dtype(np.uint8)), depth_counts
 
-    def _calibrate(self, color: "dai.ImgFrame", depth: "dai.ImgFrame") -> None:
-        if not depth.getTransformation().isAlignedTo(color.getTransformation()):
+    def _calibrate(self, color: "dai.ImgFrame", depth: "dai.ImgFrame | None") -> None:
+        if depth is not None and not depth.getTransformation().isAlignedTo(color.getTransformation()):
             raise BadDeviceData(f"camera {self._info.name}: the depth image is not aligned to the colour image")
         intrinsics = intrinsics_of(color)
         self._info = replace(self._info, color=intrinsics, depth=intrinsics)

@@ -11,6 +11,7 @@ class OakSettings:
         width_px: Width of the colour image, and of the depth image aligned to it.
         height_px: Height likewise.
         rate_hz: Frame rate.
+        depth: Compute depth, too; without, frames have none and the device needs no stereo pair.
         auto_exposure: Let the camera choose exposure times.
         exposure_us: Fixed exposure, if not automatic; None: as the camera has it.
         sensitivity_iso: Fixed sensitivity that goes with `exposure_us`.
@@ -21,6 +22,7 @@ class OakSettings:
     width_px: int = 640
     height_px: int = 480
     rate_hz: int = 60
+    depth: bool = True
     auto_exposure: bool = False
     exposure_us: int | None = 8000
     sensitivity_iso: int = 400

@@ -32,7 +32,7 @@ class Source(Protocol):
     """Makes a pipeline whose colour and depth images reach a Sync node."""
 
     def connect(self, settings: OakSettings) -> tuple[Images, "dai.node.Sync"]:
-        """Return the pipeline and its Sync node, with inputs "color" and "depth" linked.
+        """Return the pipeline and its Sync node, with inputs "color" and, if depth is asked for, "depth" linked.
 
         Raises:
             DeviceNotFound: No such device, or it does not start.
@@ -86,7 +86,7 @@ def _lay_out(pipeline: "dai.Pipeline", device: "dai.Device", sync: "dai.node.Syn
     size_px = (settings.width_px, settings.height_px)
     cameras = {
         socket: pipeline.create(dai.node.Camera).build(socket, sensorFps=float(settings.rate_hz))
-        for socket in {sockets.color, sockets.left, sockets.right}
+        for socket in ({sockets.color, sockets.left, sockets.right} if settings.depth else {sockets.color})
     }
     for camera in cameras.values():
         if settings.auto_exposure:
@@ -95,6 +95,9 @@ def _lay_out(pipeline: "dai.Pipeline", device: "dai.Device", sync: "dai.node.Syn
             camera.initialControl.setManualExposure(settings.exposure_us, settings.sensitivity_iso)
     # Undistorted by the device, so that colour is a pinhole image like the depth image aligned to it.
     color = cameras[sockets.color].requestOutput(size_px, dai.ImgFrame.Type.RGB888i, enableUndistortion=True)
+    color.link(sync.inputs["color"])
+    if not settings.depth:
+        return
     stereo = pipeline.create(dai.node.StereoDepth)
     stereo.setDefaultProfilePreset(dai.node.StereoDepth.PresetMode.ROBOTICS)
     stereo.setLeftRightCheck(True)
@@ -105,5 +108,4 @@ def _lay_out(pipeline: "dai.Pipeline", device: "dai.Device", sync: "dai.node.Syn
     cameras[sockets.left].requestOutput(_STEREO_SIZE_PX, dai.ImgFrame.Type.GRAY8).link(stereo.left)
     cameras[sockets.right].requestOutput(_STEREO_SIZE_PX, dai.ImgFrame.Type.GRAY8).link(stereo.right)
     color.link(stereo.inputAlignTo)
-    color.link(sync.inputs["color"])
     stereo.depth.link(sync.inputs["depth"])

@@ -51,12 +51,16 @@ class FrameAssembler:
             rs.stream.color: ((measured.color.height_px, measured.color.width_px, 3), np.dtype(np.uint8)),
             rs.stream.depth: ((measured.depth.height_px, measured.depth.width_px), np.dtype(np.uint16)),
         }
-        self._registration = DepthRegistration(measured) if settings.align else None
-        self.info = registered_info(measured) if settings.align else measured
+        align = settings.depth and settings.align
+        self._registration = DepthRegistration(measured) if align else None
+        self.info = registered_info(measured) if align else measured
+        self._with_depth = settings.depth
         self._recorded_times = source.lossless
         self._clocks = {stream: source.stream_clock(settings.period_ns) for stream in self._shapes}
         self._mid_exposure = MidExposure(settings)
-        self._pairer: Pairer[_Raw] = Pairer(settings.period_ns, stats)
+        self._pairer: Pairer[_Raw] = (
+            Pairer(settings.period_ns, stats) if settings.depth else Pairer(settings.period_ns, stats, patience=0)
+        )
         self._numbering = FrameNumbering(stats)
         self._queue = queue
         self._stats = stats
@@ -124,7 +128,7 @@ class FrameAssembler:
             self._queue.put(error)
             return
         if depth_counts is None:
-            self._stats.without_depth += 1
+            self._stats.without_depth += self._with_depth
         elif self._registration is not None:
             depth_counts = self._registration.apply(depth_counts)
         if self._recorded_times:

@@ -16,9 +16,21 @@ _MAX_PRESETS = 100
 def apply_options(color_sensor: Any, depth_sensor: Any, settings: RealsenseSettings) -> None:
     """Set up both sensors; the preset first, since it changes the others.
 
+    Args:
+        color_sensor: The sensor that streams colour.
+        depth_sensor: The one that streams depth; None if none does.
+        settings: What to set.
+
     Raises:
-        DriverError: The sensor lacks an option, or the value is out of its range; says which values it takes.
+        DriverError: Something is asked for of depth that is not streamed; the sensor lacks an option, or the value is out of
+            its range; says which values it takes.
     """
+    if depth_sensor is None:
+        if settings.preset is not None or settings.laser_power is not None or settings.depth_options:
+            raise DriverError("preset, laser_power and depth_options need depth: leave them out, or stream depth")
+        _set_exposure(color_sensor, settings)
+        _set_all(color_sensor, settings.color_options)
+        return
     if settings.preset is not None:
         _set(depth_sensor, "visual_preset", _preset_value(depth_sensor, settings.preset))
     _set_exposure(color_sensor, settings)

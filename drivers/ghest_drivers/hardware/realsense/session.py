@@ -4,6 +4,8 @@ import logging
 import threading
 from typing import Any
 
+import numpy as np
+
 from ghest_drivers.clock import Clock
 from ghest_drivers.errors import DeviceLost, DeviceNotFound, DriverError, EndOfStream
 from ghest_drivers.hardware.cameras.frame_queue import FrameQueue
@@ -20,6 +22,7 @@ from ghest_drivers.samples import CameraInfo, RgbdFrame
 
 _log = logging.getLogger(__name__)
 _END_POLL_S = 0.05
+_NO_DEPTH_UNIT_M = 0.001  # of a camera without depth images: anything
 
 
 class Session:
@@ -89,12 +92,12 @@ class Session:
         sensors = list(self._device.query_sensors())
         color, depth = _streams(sensors, settings)
         if not self._source.finite:
-            apply_options(color.sensor, depth.sensor, settings)
+            apply_options(color.sensor, None if depth is None else depth.sensor, settings)
         measured = self._describe(sensors, color, depth, settings)
         assembler = FrameAssembler(measured, self._source, settings, self._queue, stats)
         if not self._source.finite:
             self._watch_for_unplugging()
-        self._groups = group_by_sensor((color, depth))
+        self._groups = group_by_sensor((color,) if depth is None else (color, depth))
         for sensor, profiles in self._groups:
             sensor.open(profiles)
         on_frame = _callback(self._name, assembler, self._queue, clock)
@@ -110,16 +113,17 @@ class Session:
             self._watcher.start()
         return assembler.info
 
-    def _describe(self, sensors: list[Any], color: Stream, depth: Stream, settings: RealsenseSettings) -> CameraInfo:
+    def _describe(self, sensors: list[Any], color: Stream, depth: Stream | None, settings: RealsenseSettings) -> CameraInfo:
         facts = describe(self._device)
+        intrinsics = intrinsics_from_sdk(color.profile.get_intrinsics(), is_depth=False)
         return CameraInfo(
             name=self._name,
             model=facts.model,
             serial=facts.serial,
-            color=intrinsics_from_sdk(color.profile.get_intrinsics(), is_depth=False),
-            depth=intrinsics_from_sdk(depth.profile.get_intrinsics(), is_depth=True),
-            depth_unit_m=depth_unit_m(sensors),
-            color_from_depth=transform_from_sdk(depth.profile.get_extrinsics_to(color.profile)),
+            color=intrinsics,
+            depth=intrinsics if depth is None else intrinsics_from_sdk(depth.profile.get_intrinsics(), is_depth=True),
+            depth_unit_m=_NO_DEPTH_UNIT_M if depth is None else depth_unit_m(sensors),
+            color_from_depth=np.eye(4) if depth is None else transform_from_sdk(depth.profile.get_extrinsics_to(color.profile)),
             rate_hz=float(settings.rate_hz),
         )
 
@@ -141,9 +145,11 @@ class Session:
                 return
 
 
-def _streams(sensors: list[Any], settings: RealsenseSettings) -> tuple[Stream, Stream]:
+def _streams(sensors: list[Any], settings: RealsenseSettings) -> tuple[Stream, Stream | None]:
     width_px, height_px = settings.width_px, settings.height_px
     color = Mode(rs.stream.color, rs.format.rgb8, width_px, height_px, settings.rate_hz)
+    if not settings.depth:
+        return find_stream(sensors, color), None
     depth_size = (settings.depth_width_px or width_px, settings.depth_height_px or height_px)
     depth = Mode(rs.stream.depth, rs.format.z16, *depth_size, settings.rate_hz)
     return find_stream(sensors, color), find_stream(sensors, depth)

@@ -15,6 +15,7 @@ class RealsenseSettings:
         depth_width_px: Depth image width; None: as colour.
         depth_height_px: Depth image height; None: as colour.
         rate_hz: Frame rate of both streams.
+        depth: Stream depth, too; without, frames have none and the device needs none.
         align: Resample depth into the colour image; otherwise depth stays as measured, with its own intrinsics and
             `color_from_depth` (better: nothing is rounded).
         auto_exposure: Let the camera choose exposure times.
@@ -34,6 +35,7 @@ class RealsenseSettings:
     depth_width_px: int | None = None
     depth_height_px: int | None = None
     rate_hz: int = 60
+    depth: bool = True
     align: bool = False
     auto_exposure: bool = False
     exposure_us: int | None = 8000
