@@ -11,7 +11,7 @@ from ghest_rt.client.limits import Limits
 from ghest_rt.client.mailbox import Updates
 from ghest_rt.client.reading import UnreadableError, read_message, read_page
 from ghest_rt.client.station_tracker import StationTracker
-from ghest_rt.client.updates import ConnectionChanged, EventReport, HealthReport, Unreadable, Update
+from ghest_rt.client.updates import ConnectionChanged, EventReport, HealthReport, Sample, Unreadable, Update
 from ghest_rt.messages.published import Event, GhAngles, Health
 
 _log = logging.getLogger(__name__)
@@ -19,6 +19,8 @@ _log = logging.getLogger(__name__)
 _BACKLOG: Final = 20_000
 _IDLE_S: Final = 0.5
 _END_WITHIN_S: Final = 2.0
+_MOST_STATIONS: Final = 256  # a peer that makes up names shall not fill the memory
+_MOST_COMPLAINTS: Final = 1000
 
 
 class Hub:
@@ -44,7 +46,8 @@ class Hub:
         self._items: queue.Queue[tuple[int, Arrival] | Updates | None] = queue.Queue(_BACKLOG)
         self._connections: Mapping[str, Connection] = {}
         self._connected: dict[str, ConnectionChanged] = {}
-        self._told: set[Unreadable] = set()
+        self._last_told: dict[str, Sample] = {}
+        self._complaints: set[Unreadable] = set()
         self._receivers: tuple[Updates, ...] = ()
         self._left: set[Updates] = set()
         self._thread = threading.Thread(target=self._work, name="ghest-client", daemon=True)
@@ -113,8 +116,8 @@ class Hub:
             receiver.put(change)
         for tracker in self.trackers.values():
             receiver.put(tracker.link)
-            if tracker.newest is not None:
-                receiver.put(tracker.newest)
+        for sample in self._last_told.values():
+            receiver.put(sample)
         self._receivers = (*self._receivers, receiver)
 
     def _tell(self, updates: Sequence[Update]) -> None:
@@ -122,16 +125,20 @@ class Hub:
             gone, self._left = self._left, set()
             self._receivers = tuple(receiver for receiver in self._receivers if receiver not in gone)
         for update in updates:
+            if isinstance(update, Sample):
+                self._last_told[update.station] = update
             for receiver in self._receivers:
                 receiver.put(update)
 
     def _handle(self, t_ns: int, arrival: Arrival) -> None:
+        if arrival.station and arrival.station not in self.trackers and len(self.trackers) >= _MOST_STATIONS:
+            return
         try:
             self._tell(self._read(t_ns, arrival))
         except UnreadableError as error:
             unreadable = Unreadable(arrival.station, str(error))
-            if unreadable not in self._told:
-                self._told.add(unreadable)
+            if unreadable not in self._complaints and len(self._complaints) < _MOST_COMPLAINTS:
+                self._complaints.add(unreadable)
                 self._tell([unreadable])
 
     def _read(self, t_ns: int, arrival: Arrival) -> list[Update]:

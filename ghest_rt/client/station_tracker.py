@@ -42,12 +42,17 @@ class StationTracker:
 
     def on_message(self, endpoint: str, message: GhAngles, t_ns: int) -> list[Update]:
         """A sample came by itself at `t_ns`."""
-        if message.run_id != self._run_id:
+        if message.run_id != self._run_id or self._stepped_back(message):
             self._run_id, self._delay = message.run_id, DelayMeter()
         sample = Sample(self._station, message, t_ns, self._delay.measure(t_ns, message.t_publish_ns) * 1e-6)
         self.newest = sample
         ordered = self._sequence.accept(sample, t_ns)
         return [*_told(self._liveness.on_sample(endpoint, sample.delay_ms, t_ns)), *ordered]
+
+    def _stepped_back(self, message: GhAngles) -> bool:
+        """Whether the sender's clock did: a recording replayed with `--speed max` begins again."""
+        last = None if self.newest is None else self.newest.message
+        return last is not None and message.seq > last.seq and message.t_publish_ns < last.t_publish_ns
 
     def on_last(self, message: GhAngles, t_ns: int) -> list[Update]:
         """The last sample came because we asked for it on arrival: it may be of long ago."""

@@ -18,7 +18,7 @@ from ghest_rt.client import (
     Update,
 )
 from ghest_rt.errors import BadInputError, GhestError
-from tests.client.fakes import FakeStation, Network, Told, wait
+from tests.client.fakes import NOTHING, SLOT_NS, FakeStation, Network, Told, message, wait
 
 
 def state_of(client: GhestClient, station: str = "one") -> tuple[LinkState, LinkCause] | None:
@@ -243,3 +243,27 @@ def test_closing_ends_those_who_wait() -> None:
 def test_what_cannot_be_meant_is_refused_at_once(connect: str, stations: str, named: str) -> None:
     with pytest.raises(BadInputError, match=named):
         GhestClient(connect, stations=stations)
+
+
+def test_a_peer_that_makes_up_stations_does_not_fill_the_memory() -> None:
+    with FakeStation() as station, GhestClient(station.endpoint) as client:
+        told = Told(client.updates())
+        station.publish_until(lambda: bool(told.seqs()))
+        for k in range(300):
+            station.session.put(f"ghest/made-up-{k}/gh/angles", message(0).model_dump_json().encode())
+        station.publish(3)
+        told.wait(lambda: [s.message.seq for s in told.samples() if s.station == "one"][-1] == station.next_seq - 1)
+        assert len(client.stations()) == 256
+
+
+def test_a_recording_that_begins_again_is_no_delay() -> None:
+    """With `--speed max` times are the recording's."""
+    with FakeStation() as station, GhestClient(station.endpoint) as client:
+        told = Told(client.updates())
+        station.publish_until(lambda: client.latest() is not None)
+        first_seq = station.next_seq
+        for k in range(first_seq, first_seq + 50):
+            station.publisher.angles(message(k, station.run_id, (k % 20) * SLOT_NS), NOTHING)
+            time.sleep(0.002)
+        told.wait(lambda: told.seqs()[-1] == first_seq + 49)
+        assert max(sample.delay_ms for sample in told.samples() if sample.message.seq >= first_seq) < 150.0
