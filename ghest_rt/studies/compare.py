@@ -85,6 +85,7 @@ def _rows(scenario: Scenario, result: Mapping[str, object]) -> list[Row]:
             **found[key],
             "duration_s": result["duration_s"],
             "girdle_turn_deg": result["girdle_turn_deg"],
+            "straight_forecast_deg": result["straight_forecast_deg"],
         }
         for key in CONTENDERS
     ]
@@ -119,8 +120,15 @@ def _verdicts(rows: Sequence[Row]) -> list[Row]:
         there = [row for row in rows if (row["sensor"], row["movement"]) == (sensor, movement)]
         figures = {key: _mean([row for row in there if row["contender"] == key]) for key in CONTENDERS}
         lag_ms = {str(row["contender"]): float(cast(float, row["lag_ms"])) for row in there}
+        straight_deg = mean_of(there, "straight_forecast_deg")
         for key, who in CONTENDERS.items():
             if key != "fused":
-                said = verdict(who, cast(dict[str, float], figures[key]), cast(dict[str, float], figures["fused"]), lag_ms[key])
+                said = verdict(
+                    who,
+                    cast(dict[str, float], figures[key]),
+                    cast(dict[str, float], figures["fused"]),
+                    lag_ms[key],
+                    straight_deg,
+                )
                 verdicts.append({"sensor": sensor, "movement": movement, "contender": key, **asdict(said)})
     return verdicts

@@ -33,7 +33,9 @@ class Verdict:
     verdict: str
 
 
-def verdict(who: Contender, theirs: Mapping[str, float], fused: Mapping[str, float], lag_ms: float) -> Verdict:
+def verdict(
+    who: Contender, theirs: Mapping[str, float], fused: Mapping[str, float], lag_ms: float, straight_forecast_deg: float
+) -> Verdict:
     """Return the outcome of a row.
 
     Args:
@@ -41,6 +43,7 @@ def verdict(who: Contender, theirs: Mapping[str, float], fused: Mapping[str, flo
         theirs: Its RMS errors by quantity, degrees; NaN where nothing was judged.
         fused: Those of `fused`.
         lag_ms: How long after an instant the contender's answer is published.
+        straight_forecast_deg: How far the arm departs from its own straight course between two images.
     """
     if math.isnan(theirs["orientation_deg"]):
         return Verdict(True, True, (), f"fused wins: {who.title} has no answer at all")
@@ -56,7 +59,13 @@ def verdict(who: Contender, theirs: Mapping[str, float], fused: Mapping[str, flo
             f"{_deg(fused['published_deg'])} against {_deg(theirs['published_deg'])}"
         )
         return Verdict(False, True, lost, f"judged at its own instant {who.title} is nearer ({where}), {late}")
-    return Verdict(False, published, lost, f"fused does not win ({where}); {who.title} has on its side: {who.strength}")
+    jerky = (
+        f"; the movement itself departs by {_deg(straight_forecast_deg)} from a straight course between two images, which "
+        "fused has to foresee"
+        if straight_forecast_deg > 0.5 * fused["orientation_deg"]
+        else ""
+    )
+    return Verdict(False, published, lost, f"fused does not win ({where}); {who.title} has on its side: {who.strength}{jerky}")
 
 
 def _deg(value: float) -> str:

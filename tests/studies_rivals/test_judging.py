@@ -12,7 +12,14 @@ from ghest_rt.messages.results import TruthSample
 from ghest_rt.studies.compare_verdicts import verdict
 from ghest_rt.studies.latency import effective_delay_ms
 from ghest_rt.studies.latency_tasks import PlayedAt
-from ghest_rt.studies.rivals.angle_errors import Answers, error_columns, error_statistics, girdle_turn_deg, truth_track
+from ghest_rt.studies.rivals.angle_errors import (
+    Answers,
+    error_columns,
+    error_statistics,
+    girdle_turn_deg,
+    straight_forecast_deg,
+    truth_track,
+)
 from ghest_rt.studies.rivals.contenders import CONTENDERS
 from ghest_rt.studies.truth import TruthTrack
 from tests.studies_rivals.conftest import ArmOnly
@@ -76,6 +83,14 @@ def test_the_girdles_turn_is_what_lies_between_trunk_and_gh_joint() -> None:
     assert girdle_turn_deg([turned]) == pytest.approx(math.degrees(0.1))
 
 
+def test_a_steady_turn_is_foreseen_by_going_straight_on_and_a_jerk_is_not() -> None:
+    instants = [k * STEP_NS for k in range(4, 25)]
+    steady = truth_of(lambda t: rot_y(2.0 * t))
+    assert straight_forecast_deg(steady, instants, STEP_NS) == pytest.approx(0.0, abs=1e-6)
+    jerk = truth_of(lambda t: rot_y(0.5 * 40.0 * t * t))  # 40 rad/s^2: a t^2 each step
+    assert straight_forecast_deg(jerk, instants, STEP_NS) == pytest.approx(math.degrees(40.0 * 0.01**2), rel=1e-6)
+
+
 FUSED = {"orientation_deg": 0.1, "published_deg": 0.1, "flexion_deg": 0.05, "abduction_deg": 0.05, "rotation_deg": 0.05}
 WORSE = {name: 2.0 * value for name, value in FUSED.items()}
 BETTER = {name: 0.5 * value for name, value in FUSED.items()}
@@ -83,15 +98,15 @@ BETTER = {name: 0.5 * value for name, value in FUSED.items()}
 
 def test_a_row_is_won_only_in_the_rotation_and_in_every_angle() -> None:
     who = CONTENDERS["coupled_chain"]
-    assert verdict(who, WORSE, FUSED, 20.0).fused_wins
-    narrow = verdict(who, {**WORSE, "abduction_deg": 0.01}, FUSED, 20.0)
+    assert verdict(who, WORSE, FUSED, 20.0, 0.01).fused_wins
+    narrow = verdict(who, {**WORSE, "abduction_deg": 0.01}, FUSED, 20.0, 0.01)
     assert not narrow.fused_wins
     assert narrow.lost_in == ("abduction_deg",)
     assert "abduction 0.050 deg against 0.010 deg" in narrow.verdict
 
 
 def test_an_answer_that_is_better_but_late_is_called_so() -> None:
-    said = verdict(CONTENDERS["refined"], {**BETTER, "published_deg": 3.0}, FUSED, 45.0)
+    said = verdict(CONTENDERS["refined"], {**BETTER, "published_deg": 3.0}, FUSED, 45.0, 0.01)
     assert not said.fused_wins
     assert said.fused_wins_when_published
     assert "45 ms after its instant" in said.verdict
@@ -100,15 +115,16 @@ def test_an_answer_that_is_better_but_late_is_called_so() -> None:
 
 def test_a_row_that_is_lost_names_what_the_other_has_on_its_side() -> None:
     who = CONTENDERS["inertial"]
-    said = verdict(who, BETTER, FUSED, 15.0)
+    said = verdict(who, BETTER, FUSED, 15.0, 0.2)
     assert not said.fused_wins
     assert not said.fused_wins_when_published
     assert who.strength in said.verdict
+    assert "departs by 0.200 deg" in said.verdict
 
 
 def test_who_never_answers_has_lost() -> None:
     silent = dict.fromkeys(FUSED, math.nan)
-    assert verdict(CONTENDERS["aruco"], silent, FUSED, 45.0).fused_wins
+    assert verdict(CONTENDERS["aruco"], silent, FUSED, 45.0, 0.01).fused_wins
 
 
 def test_every_contender_says_what_its_publication_reports_and_what_to_bear_in_mind() -> None:

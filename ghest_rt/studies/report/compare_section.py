@@ -75,19 +75,24 @@ def _table(summary: Row, sensor: str, kind: str) -> Table:
                 Cell(who["published_short"], "published"),
             )
         )
-    girdle = _movements(summary, sensor, kind)
-    turned = ", ".join(f"{name} {number(deg)}°" for name, deg in girdle.items())
+    turned, unforeseen = (
+        ", ".join(f"{name} {number(deg)}°" for name, deg in _movements(summary, sensor, kind, column).items())
+        for column in ("girdle_turn_deg", "straight_forecast_deg")
+    )
     return Table(
         title=f"Mean over {_KINDS[kind]}, sensor {sensor}: errors (°)",
         head=("contender", *(title for _, title in _COLUMNS), "fused wins", "… when published", "its own publication"),
         rows=tuple(rows),
-        note=f"The scapula turned by (RMS against the neutral posture, unseen by any encoder): {turned}.",
+        note=(
+            f"The scapula turned by (RMS against the neutral posture, unseen by any encoder): {turned}. Between two images the "
+            f"arm departed from a straight course by (RMS): {unforeseen}."
+        ),
     )
 
 
-def _movements(summary: Row, sensor: str, kind: str) -> dict[str, float]:
-    """Return the movements of a kind and by how much the scapula turned in each, degrees."""
-    return {r["movement"]: r["girdle_turn_deg"] for r in summary["rows"] if (r["sensor"], r["kind"]) == (sensor, kind)}
+def _movements(summary: Row, sensor: str, kind: str, column: str = "girdle_turn_deg") -> dict[str, float]:
+    """Return the movements of a kind and what a column says of each."""
+    return {r["movement"]: r[column] for r in summary["rows"] if (r["sensor"], r["kind"]) == (sensor, kind)}
 
 
 def _by_movement(summary: Row, sensor: str) -> Table:

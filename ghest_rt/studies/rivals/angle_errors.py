@@ -79,6 +79,20 @@ def girdle_turn_deg(truth: Sequence[TruthSample]) -> float:
     return _rms(np.array(turns))
 
 
+def straight_forecast_deg(truth: TruthTrack, instants_ns: Sequence[int], period_ns: int) -> float:
+    """Return the error of going straight on: the true rotation a period ago, continued at its true rate of the period before.
+
+    RMS over the instants. It tells how much of a movement cannot be foreseen between one image and the next, whoever forecasts.
+    """
+    errors = []
+    for t_ns in instants_ns:
+        now, newest, before = (truth.at(t_ns - k * period_ns) for k in range(3))
+        if now is not None and newest is not None and before is not None:
+            straight = newest.gh_from_arm @ before.gh_from_arm.T @ newest.gh_from_arm
+            errors.append(math.degrees(angle_between_rad(now.gh_from_arm, straight)))
+    return _rms(np.array(errors, dtype=np.float64))
+
+
 def _errors(rotation: Array | None, at: TruthSample | None, published: TruthSample | None) -> list[float]:
     if rotation is None or at is None:
         return [math.nan] * len(QUANTITIES)
