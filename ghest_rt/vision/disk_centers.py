@@ -106,7 +106,7 @@ class DiskMeter:
             corners.append((left + half, top + half))
             offsets.append((u - left - half, v - top - half))
 
-        quadratics = [_quadratic(disk, *offset) for disk, offset in zip(predicted.disks, offsets, strict=True)]
+        quadratics = [ellipse_quadratic(disk, *offset) for disk, offset in zip(predicted.disks, offsets, strict=True)]
         quad = np.array(quadratics, dtype=np.float32) @ basis  # 1 on the predicted edges
         inside = quad < max(1.0 - band, _LEAST_INSIDE) ** 2
         near = quad < (1.0 + band) ** 2
@@ -183,8 +183,8 @@ def _inside(image: NDArray[np.uint8], place: tuple[float, float], disk: DiskImag
     return bool(du <= place[0] <= width - 1 - du and dv <= place[1] <= height - 1 - dv)
 
 
-def _quadratic(disk: DiskImage, x: float, y: float) -> tuple[float, float, float, float, float, float]:
-    """Return (p - o)^T S^-1 (p - o) with o = (x, y) as coefficients of [1, u, v, u^2, u v, v^2]."""
+def ellipse_quadratic(disk: DiskImage, x: float, y: float) -> tuple[float, float, float, float, float, float]:
+    """Return (p - o)^T S^-1 (p - o) with o = (x, y) as coefficients of [1, u, v, u^2, u v, v^2]; 1 on the edge."""
     inverse = 1.0 / max(disk.determinant, 1e-12)
     a, b, c = disk.c * inverse, -disk.b * inverse, disk.a * inverse
     au, av = a * x + b * y, b * x + c * y

@@ -15,7 +15,7 @@ from ghest_rt.vision.checks import check_frame
 from ghest_rt.vision.color_blobs import BlobFinder
 from ghest_rt.vision.constellation import Constellation, ConstellationFinder
 from ghest_rt.vision.disk_centers import Color, DiskCenters, DiskMeter
-from ghest_rt.vision.ellipses import marker_image
+from ghest_rt.vision.ellipses import MarkerImage, marker_image
 from ghest_rt.vision.layout import MarkerLayout
 from ghest_rt.vision.motion import MotionTrack
 from ghest_rt.vision.optics import Optics
@@ -77,6 +77,7 @@ class RefinedDetector:
         self._motion = MotionTrack()
         self._white: Color | None = None
         self._light: PlateLight | None = None
+        self._predicted: MarkerImage | None = None
         self._depth_from_color = inverse(info.color_from_depth)
         self._same_place = bool(np.abs(info.color_from_depth - np.eye(4)).max() < 1e-12)
         margin_m = self._layout.half_plate_m - float(np.abs(self._layout.centers_m).max()) - self._layout.radius_m
@@ -178,16 +179,20 @@ class RefinedDetector:
             solution = self._track(frame, transform(solution.fit.R, solution.fit.p_m))
         elif solution.fit is not None:
             self._learn(measured)
+            H = np.column_stack([solution.fit.R[:, :2], solution.fit.p_m])
+            self._predicted = marker_image(H, self._centers_m, self._layout.radius_m, self._optics)
             solution = self._polished(frame, measured, plane, solution)
         return solution
 
     def _polished(self, frame: RgbdFrame, measured: DiskCenters, plane: Plane | None, solution: Solution) -> Solution:
         """Return the solution with a better pose where there is one; a disk left out by the fit must not come in again."""
         seen = sum(disk is not None for disk in measured)
-        if self._polish is None or solution.fit is None or self._light is None or solution.disks < seen:
+        if self._polish is None or solution.fit is None or solution.disks < seen:
+            return solution
+        if self._light is None or self._predicted is None:
             return solution
         used = plane if solution.status is MarkerStatus.OK else None
-        fit = self._polish(Sighting(frame.color_rgb, measured, self._light, used, solution.fit))
+        fit = self._polish(Sighting(frame.color_rgb, self._predicted, measured, self._light, used, solution.fit))
         return solution if fit is None else replace(solution, fit=fit)
 
     def _cold_pair(self, frame: RgbdFrame, constellation: Constellation) -> Solution:
@@ -205,7 +210,7 @@ class RefinedDetector:
         light = self._sampler(image, H)
         if predicted is None or light is None:
             return MarkerStatus.NOT_FOUND
-        self._light = light
+        self._light, self._predicted = light, predicted
         places = [(disk.u, disk.v) for disk in predicted.disks]
         for look in range(_MAX_LOOKS):
             band = max(min(band_px, _BAND_OF_MARGIN * self._margin * predicted.minor_px), 1.0)

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ghest_rt.vision.disk_centers import DiskCenters
+from ghest_rt.vision.ellipses import MarkerImage
 from ghest_rt.vision.plate_light import PlateLight
 from ghest_rt.vision.plate_plane import Plane
 from ghest_rt.vision.pose_fit import PoseFit
@@ -18,6 +19,7 @@ class Sighting:
 
     Attributes:
         image: (H, W, 3) colour image.
+        predicted: The disks as foretold; their shapes are good enough to find their edges.
         measured: The disks p0..p3; None where one is not wholly seen.
         light: The light on the plate.
         plane: The plate's plane in the colour camera at the colour image's time; None where depth takes no part.
@@ -25,6 +27,7 @@ class Sighting:
     """
 
     image: NDArray[np.uint8]
+    predicted: MarkerImage
     measured: DiskCenters
     light: PlateLight
     plane: Plane | None

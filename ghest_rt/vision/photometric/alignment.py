@@ -1,7 +1,8 @@
 """Gauss-Newton on the coverage of every pixel near the disks' edges, and on the depth plane.
 
-Unknowns: the pose (rotation w, translation t, both in camera axes), the blur of the edges and an offset of all edges along
-their normals, which takes up what makes every disk look larger or smaller (a curved tone scale, bleeding of print or pixels).
+Unknowns: the pose (rotation w, translation t, both in the plate's axes) and the blur of the edges; for each disk an offset of
+its edge along the normal, which takes up what makes it look larger or smaller (a curved tone scale, bleeding of print or
+pixels), and a small shift of the whole disk (print, lens: what no number of pixels averages out).
 """
 
 import math
@@ -13,84 +14,81 @@ import numpy as np
 from ghest_rt.geometry.so3 import Array, exp_so3
 from ghest_rt.vision.layout import MarkerLayout
 from ghest_rt.vision.optics import Optics
-from ghest_rt.vision.photometric.edge_pixels import EdgePixelSampler
+from ghest_rt.vision.photometric.edge_pixels import EdgePixels, EdgePixelSampler, Edges
 from ghest_rt.vision.photometric.edge_profile import PIXEL_VARIANCE, profile_of
 from ghest_rt.vision.pose_fit import PoseFit, plane_terms
 from ghest_rt.vision.sighting import Sighting
 from ghest_rt.vision.small import inverse_of
 
-_MAX_STEPS = 3
+_MAX_STEPS = 6
 _SETTLED_PX = 0.15  # a step that moves no edge by more needs no other
+_SETTLED_BLUR_PX = 0.1  # nor a change of blur that is less
 _MAX_SHIFT_PX = 0.6
-_FIRST_BLUR_PX = 0.08
+_FIRST_BLURS_PX = (0.08, 0.5, 1.0)
 _BLUR_RANGE_PX = (0.02, 1.1)
 _BLUR_PRIOR_PX = 0.3
 _OFFSET_PRIOR_PX = 0.05
+_LEAST_UNEVEN_PX = 0.004  # shift of a disk that is always possible
+_MOST_UNEVEN_PX = 0.2
+_UNEVEN_FREEDOM = 5.0  # what eight shifts and a plane say beyond the pose
+_DOUBTFUL = 2.0  # by which factor squared shifts must be larger than thought for another step
 _SIGMAS = 3.5
 _LEAST_NOISE = 1.2  # of 255: rounding, and what the profile does not know
 _MAX_NOISE = 30.0
 _LEAST_PIXELS = 60
 _FOLLOW = 0.3
-_MAX_CONFLICT = 60.0  # squared deviations from the pose before, by its covariance, beyond which something else was aligned
-_PLANE_EXPECTED = 3.0
+_MAX_CONFLICT = 300.0  # squared deviations from the pose before, by its covariance, beyond which something else was aligned
+_FIT, _BENDS = 8, 3  # rows of a block: pose, blur and the residual; offset and shift of a disk
+_CORNER = np.arange(_FIT, _FIT + _BENDS)
 
 
 class Alignment:
-    """Improves poses from disk centres by the disks' edges. Remembers the blur."""
+    """Improves poses from disk centres by the disks' edges. Remembers the blur, and how unevenly the disks are placed."""
 
     def __init__(self, layout: MarkerLayout, optics: Optics) -> None:
         self._sampler = EdgePixelSampler(layout, optics)
-        self._blur_px = _FIRST_BLUR_PX
-        self._radius_m = layout.radius_m
+        self.reset()
 
     def reset(self) -> None:
-        """Forget the blur."""
-        self._blur_px = _FIRST_BLUR_PX
+        """Forget what earlier frames taught."""
+        self._sampler.reset()
+        self._blur_px: float | None = None
+        self._uneven_px = _LEAST_UNEVEN_PX
 
     def __call__(self, sighting: Sighting) -> PoseFit | None:
         """Return the aligned pose, or None if the edges do not make it better."""
-        fit = sighting.fit
+        fit, plane = sighting.fit, sighting.plane
         R, p_m = fit.R, fit.p_m
-        blur_px, offset_px = self._blur_px, 0.0
-        pixels = self._sampler(sighting, R, p_m, blur_px)
-        if pixels is None:
+        pixels = self._sampler(sighting, _FIRST_BLURS_PX[1] if self._blur_px is None else self._blur_px)
+        plane_information = np.zeros((3, 3)) if plane is None else inverse_of(plane.covariance)
+        edges = None if pixels is None else pixels.edges(R, p_m)
+        if pixels is None or edges is None or plane_information is None:
             return None
-        plane_information = np.zeros((3, 3)) if sighting.plane is None else inverse_of(sighting.plane.covariance)
-        if plane_information is None:
-            return None
-        for _ in range(_MAX_STEPS):
-            edges = pixels.edges(R, p_m)
-            if edges is None:
+        expected_px = blur_px = _likely_blur(pixels, edges) if self._blur_px is None else self._blur_px
+        uneven_px = self._uneven_px
+        bends = np.zeros((len(pixels.spans), _BENDS))
+        axes = np.zeros((6, 6))
+        for step in range(_MAX_STEPS):
+            if step:
+                edges = pixels.edges(R, p_m)
+                if edges is None:
+                    return None
+            blocks = _blocks(pixels, edges, blur_px, bends)
+            if blocks is None:
                 return None
-            profile = profile_of(blur_px)
-            bend = 0.5 * (PIXEL_VARIANCE + profile.blur_px * profile.blur_px)
-            table = profile(edges.distance_px + bend * edges.curvature - offset_px, edges.sine2)
-            J = np.empty((8, len(edges.distance_px)))
-            np.multiply(edges.jacobian, table[1], out=J[:6])
-            np.negative(table[1], out=J[6])
-            J[7] = table[2]
-            J *= pixels.contrast
-            residual = (pixels.alpha - table[0] - (blur_px - profile.blur_px) * table[2]) * pixels.contrast
-            noise2 = _noise2(residual)
-            if noise2 > _MAX_NOISE**2:
-                return None
-            used = np.abs(residual) < _SIGMAS * math.sqrt(noise2)
-            residual *= used
-            J *= used
-            count = int(np.count_nonzero(used))
-            if count < _LEAST_PIXELS:
-                return None
-            # Edges are noisier than areas: the noise that counts is that of the pixels that inform.
-            slope2 = J[6] * J[6]
-            noise2 = max(float(slope2 @ (residual * residual)) / float(slope2.sum()) * count / (count - 8), _LEAST_NOISE**2)
-            information = (J @ J.T) / noise2
-            gradient = (J @ residual) / noise2
-            information[6, 6] += _OFFSET_PRIOR_PX**-2
-            gradient[6] -= offset_px * _OFFSET_PRIOR_PX**-2
-            information[7, 7] += _BLUR_PRIOR_PX**-2
-            gradient[7] += (self._blur_px - blur_px) * _BLUR_PRIOR_PX**-2
-            if sighting.plane is not None:
-                off, J_plane = plane_terms(R, p_m, sighting.plane)
+            certainty = np.array([_OFFSET_PRIOR_PX**-2, uneven_px**-2, uneven_px**-2])
+            blocks[:, _CORNER, _CORNER] += certainty
+            blocks[:, _FIT:, _FIT - 1] -= bends * certainty
+            inverses = np.linalg.inv(blocks[:, _FIT:, _FIT:])
+            answers = inverses @ blocks[:, _FIT:, :_FIT]
+            reduced = np.add.reduce(blocks[:, :_FIT, :_FIT] - blocks[:, :_FIT, _FIT:] @ answers, axis=0)
+            information, gradient = reduced[:7, :7].copy(), reduced[:7, 7].copy()
+            information[6, 6] += _BLUR_PRIOR_PX**-2
+            gradient[6] += (expected_px - blur_px) * _BLUR_PRIOR_PX**-2
+            axes[:3, :3] = axes[3:, 3:] = R
+            if plane is not None:
+                off, J_plane = plane_terms(R, p_m, plane)
+                J_plane = J_plane @ axes
                 weighted = plane_information @ J_plane
                 information[:6, :6] += J_plane.T @ weighted
                 gradient[:6] += off @ weighted
@@ -101,29 +99,86 @@ class Alignment:
             moved_px = float(np.abs(change[:6] @ edges.jacobian).max())
             if not moved_px < _MAX_SHIFT_PX:
                 return None
-            R = exp_so3(change[:3]) @ R
-            p_m = p_m + change[3:6]
-            offset_px += float(change[6])
-            blur_px = min(max(blur_px + float(change[7]), _BLUR_RANGE_PX[0]), _BLUR_RANGE_PX[1])
-            if moved_px < _SETTLED_PX:
+            p_m = p_m + R @ change[3:6]
+            R = exp_so3(R @ change[:3]) @ R
+            bends += answers[:, :, 7] - answers[:, :, :7] @ change
+            before_px, blur_px = blur_px, min(max(blur_px + float(change[6]), _BLUR_RANGE_PX[0]), _BLUR_RANGE_PX[1])
+            shifts = bends[:, 1:].ravel()
+            shift2 = float(shifts @ shifts) / _UNEVEN_FREEDOM
+            shift2 += float(inverses.reshape(-1, _BENDS * _BENDS)[:, 4::4].sum()) / len(shifts)  # the shifts' variances
+            settled = moved_px < _SETTLED_PX and abs(blur_px - before_px) < _SETTLED_BLUR_PX
+            if settled and shift2 < _DOUBTFUL * uneven_px**2:
                 break
-        return self._judged(sighting, R, p_m, blur_px, information)
-
-    def _judged(self, sighting: Sighting, R: Array, p_m: Array, blur_px: float, information: Array) -> PoseFit | None:
-        """Return the fit with the nuisances taken out of its information; None if it contradicts the pose it came from."""
-        fit = sighting.fit
-        nuisances = inverse_of(information[6:, 6:].copy())
-        if nuisances is None:
+            uneven_px = min(max(math.sqrt(shift2), uneven_px), _MOST_UNEVEN_PX)
+        # The blur is taken out of the information; the bends are already.
+        cross = information[:6, 6]
+        pose_information = axes @ (information[:6, :6] - np.outer(cross, cross / information[6, 6])) @ axes.T
+        if not self._agrees(fit, R, p_m):
             return None
-        cross = information[:6, 6:]
-        pose_information = information[:6, :6] - cross @ nuisances @ cross.T
+        self._blur_px = blur_px if self._blur_px is None else self._blur_px + _FOLLOW * (blur_px - self._blur_px)
+        uneven_px = max(math.sqrt(shift2), _LEAST_UNEVEN_PX)
+        self._uneven_px += _FOLLOW * (uneven_px - self._uneven_px)
+        return replace(fit, R=R, p_m=p_m, information=pose_information)
+
+    @staticmethod
+    def _agrees(fit: PoseFit, R: Array, p_m: Array) -> bool:
+        """Whether a pose does not contradict the one that it began from."""
         turn = R @ fit.R.T
         w = 0.5 * np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
         away = np.concatenate([w, p_m - fit.p_m])
-        if float(away @ fit.information @ away) > _MAX_CONFLICT:
-            return None
-        self._blur_px += _FOLLOW * (blur_px - self._blur_px)
-        return replace(fit, R=R, p_m=p_m, information=pose_information)
+        return float(away @ fit.information @ away) < _MAX_CONFLICT
+
+
+def _blocks(pixels: EdgePixels, edges: Edges, blur_px: float, bends: Array) -> Array | None:
+    """Return what the pixels of each disk say, or None if they do not show its edge.
+
+    Args:
+        pixels: The pixels.
+        edges: Where they are.
+        blur_px: Blur of the edges.
+        bends: (disks, 3) offset of each disk's edge along its normal, and shift of the disk to the right and down, pixels.
+
+    Returns:
+        (disks, 11, 11): products, over the noise's variance, of the derivatives by pose (6) and blur (1), the residual (1), and
+        the derivatives by the bends (3).
+    """
+    profile = profile_of(blur_px)
+    distance_px = edges.distance_px + (0.5 * (PIXEL_VARIANCE + profile.blur_px * profile.blur_px)) * edges.curvature
+    if bends.any():
+        for span, (offset, right, down) in zip(pixels.spans, bends.tolist(), strict=True):
+            distance_px[span] -= offset + right * edges.normal[0, span] + down * edges.normal[1, span]
+    covered, slope, widening = profile(distance_px, edges.sine2)
+    covered += (blur_px - profile.blur_px) * widening
+    J = np.empty((_FIT + _BENDS, len(slope)))
+    residual = J[7]
+    covered *= pixels.contrast
+    np.subtract(pixels.excess, covered, out=residual)
+    noise2 = _noise2(residual)
+    used = np.abs(residual) < _SIGMAS * math.sqrt(noise2)
+    count = int(np.count_nonzero(used))
+    if noise2 > _MAX_NOISE**2 or count < _LEAST_PIXELS:
+        return None
+    residual *= used
+    weight = pixels.contrast * used
+    slope *= weight
+    np.multiply(edges.jacobian, slope, out=J[:6])
+    np.multiply(widening, weight, out=J[6])
+    np.negative(slope, out=J[8])
+    np.multiply(edges.normal, J[8], out=J[9:])
+    # Edges are noisier than areas: the noise that counts is that of the pixels that inform.
+    informed = slope * residual
+    noise2 = float(informed @ informed) / float(slope @ slope) * count / (count - len(J))
+    J *= 1.0 / math.sqrt(max(noise2, _LEAST_NOISE**2))
+    return np.array([J[:, span] @ J[:, span].T for span in pixels.spans])
+
+
+def _likely_blur(pixels: EdgePixels, edges: Edges) -> float:
+    """Return the blur with which the pixels are explained best, of a few."""
+
+    def misfit(blur_px: float) -> float:
+        return float(np.abs(pixels.excess - pixels.contrast * profile_of(blur_px)(edges.distance_px, edges.sine2)[0]).sum())
+
+    return min(_FIRST_BLURS_PX, key=misfit)
 
 
 def _noise2(residual: Array) -> float:

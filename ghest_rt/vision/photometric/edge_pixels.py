@@ -2,10 +2,12 @@
 
 The ray of every pixel is taken back to the plate by the inverse homography G: X = G ray / (G_3 ray), exact for any lens. With
 n = (X - c) / |X - c| the plate distance from the edge is e = |X - c| - r and its gradient by a displacement of the plate
-point's camera coordinates is k = G^T (n, -n . X), perpendicular to the ray; a plate that moves by w x q + t (q from the
-plate's origin) changes e by -k . (w x q + t). Divided by |grad e| in the image all this is in pixels.
+point is k, in plate axes k = (n_x, n_y, -n . (X + p_xy) / p_z) with p the plate's origin in these axes; k is perpendicular to
+the ray. A plate that moves by w x q + t (q from the plate's origin) changes e by -k . (w x q + t). Divided by |grad e| in the
+image all this is in pixels.
 """
 
+import itertools
 import math
 from dataclasses import dataclass
 
@@ -13,18 +15,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ghest_rt.geometry.so3 import Array
-from ghest_rt.vision.disk_centers import DiskCenters, mixing_rows
+from ghest_rt.vision.disk_centers import Color, ellipse_quadratic
+from ghest_rt.vision.ellipses import MarkerImage
 from ghest_rt.vision.layout import MarkerLayout
 from ghest_rt.vision.optics import Optics
+from ghest_rt.vision.photometric.mosaic import MosaicSense
+from ghest_rt.vision.plate_light import PlateLight
 from ghest_rt.vision.sighting import Sighting
 
 _LEAST_DISKS = 3
-_LEAST_FACING = 0.3  # cosine of the steepest slant for which the band is lengthened
-_OF_RADIUS = 0.7  # share of the radius that the band may take
-_OFF_AXIS = 1.15  # how much larger things may appear off the camera's axis
+_LEAST_RADIUS = 0.3  # share of the radius that is never an edge
 _EDGE_PX = 1.3  # half width of the band of pixels at the edge, besides blur
 _BLURS = 2.5  # how many standard deviations of blur the band takes in
+_LEAST_STEP = 0.05  # between the colours of plate and disk, in units of brightness
 _OF_MARGIN = 0.8  # share of the white margin that the band may take
+
+Float32 = NDArray[np.float32]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,65 +39,80 @@ class Edges:
 
     Attributes:
         distance_px: (n,) distance from the edge, positive outside the disk.
-        jacobian: (6, n) its derivative by rotation (rad) and translation (m) of the plate in camera axes.
+        jacobian: (6, n) its derivative by rotation (rad) and translation (m) of the plate, in plate axes.
         curvature: (n,) of the edge, 1/px.
-        sine2: (n,) |sin 2t| of the direction t of the edge's normal.
+        normal: (2, n) direction across the edge in the image, outwards.
+        curvature: (n,) of the edge, 1/px.
+        sine2: (n,) |sin 2t| of the direction t of the normal.
     """
 
     distance_px: Array
     jacobian: Array
+    normal: Array
     curvature: Array
     sine2: Array
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EdgePixels:
-    """The pixels chosen.
+    """The pixels chosen, disk by disk and row by row.
 
     Attributes:
         rays: (3, n) rays (x, y, 1).
         centers_m: (2, n) centres of the disks they are at.
-        alpha: (n,) measured coverage.
-        contrast: (n,) what coverage one means in the image, in 255ths.
-        focal_px: (n,) scale from rays to pixels.
+        spans: The pixels of each disk seen.
+        excess: (n,) what a pixel shows beyond the plate's colour, along the step from plate to disk, of 255.
+        contrast: (n,) the size of that step: coverage is excess over contrast.
+        focal_px: (n,) or one scale from rays to pixels.
+        mean_focal_px: Its mean.
         radius_m: Radius of the disks.
     """
 
     rays: Array
     centers_m: Array
-    alpha: Array
+    spans: list[slice]
+    excess: Array
     contrast: Array
-    focal_px: Array
+    focal_px: Array | float
+    mean_focal_px: float
     radius_m: float
 
     def edges(self, R: Array, p_m: Array) -> Edges | None:
         """Return where the pixels are with respect to the edges; None if the pose is seen edge on."""
-        G = _plate_from_ray(R, p_m)
-        if G is None:
+        px, py, pz = (p_m @ R).tolist()  # in plate axes; p_z is the distance of the camera from the plane
+        if abs(pz) < 1e-6:
             return None
+        # (x, y, 1) Z = X r1 + Y r2 + p, and 1/Z = r3 . (x, y, 1) / p_z
+        G = R.T.copy()
+        G[2] /= pz
+        G[0] -= px * G[2]
+        G[1] -= py * G[2]
         hom = G @ self.rays
-        depth_m = 1.0 / hom[2]
+        depth_m = np.reciprocal(hom[2])
         place = hom[:2] * depth_m
-        n = np.empty((3, len(depth_m)))
-        np.subtract(place, self.centers_m, out=n[:2])
+        k = np.empty((3, len(depth_m)))
+        n = k[:2]
+        np.subtract(place, self.centers_m, out=n)
         rho = np.sqrt(n[0] * n[0] + n[1] * n[1])
-        n[:2] /= rho
-        n[2] = -(n[0] * place[0] + n[1] * place[1])
-        k = G.T @ n
-        across = np.sqrt(k[0] * k[0] + k[1] * k[1])
-        scale = self.focal_px / (across * depth_m)  # pixels per metre across the edge
+        n /= rho
+        np.add((place[0] + px) * n[0], (place[1] + py) * n[1], out=k[2])
+        k[2] *= -1.0 / pz
+        normal = R[:2] @ k
+        inverse = np.reciprocal(np.sqrt(normal[0] * normal[0] + normal[1] * normal[1]))
+        normal *= inverse
+        inverse *= self.focal_px
+        scale = inverse * hom[2]  # pixels per metre across the edge
         jacobian = np.empty((6, len(depth_m)))
         np.multiply(k, -scale, out=jacobian[3:])
-        qx, qy, qz = self.rays * depth_m - p_m[:, None]
-        fx, fy, fz = jacobian[3:]
-        jacobian[0] = qy * fz - qz * fy
-        jacobian[1] = qz * fx - qx * fz
-        jacobian[2] = qx * fy - qy * fx
-        area = (
-            abs(_determinant(G)) / (self.focal_px * self.focal_px) * (depth_m * depth_m * depth_m)
-        )  # of a pixel, on the plate
-        curvature = area * area * (scale * scale * scale) / rho
-        return Edges((rho - self.radius_m) * scale, jacobian, curvature, 2.0 * np.abs(k[0] * k[1]) / (across * across))
+        np.multiply(place[1], jacobian[5], out=jacobian[0])
+        np.multiply(place[0], -jacobian[5], out=jacobian[1])
+        np.subtract(place[0] * jacobian[4], place[1] * jacobian[3], out=jacobian[2])
+        inverse *= depth_m
+        curvature = inverse * inverse * inverse
+        curvature *= 1.0 / (pz * pz * self.mean_focal_px**4 * self.radius_m)  # det G = 1 / p_z
+        rho -= self.radius_m
+        rho *= scale
+        return Edges(rho, jacobian, normal, curvature, np.abs(2.0 * normal[0] * normal[1]))
 
 
 class EdgePixelSampler:
@@ -99,105 +120,134 @@ class EdgePixelSampler:
 
     def __init__(self, layout: MarkerLayout, optics: Optics) -> None:
         self._layout = layout
+        self._centers_m = [(float(x), float(y)) for x, y in layout.centers_m]
         self._optics = optics
         self._rays = optics.ray_table()
-        self._steps = np.array([0, 1, optics.width_px])
-        self._patches: dict[int, tuple[NDArray[np.intp], NDArray[np.float32]]] = {}
-        self._margin_m = layout.half_plate_m - float(np.abs(layout.centers_m).max()) - layout.radius_m
+        self._mosaic = MosaicSense()
+        self._patches: dict[int, tuple[NDArray[np.intp], Float32]] = {}
+        margin_m = layout.half_plate_m - float(np.abs(layout.centers_m).max()) - layout.radius_m
+        self._widest = 1.0 + _OF_MARGIN * margin_m / layout.radius_m
 
-    def __call__(self, sighting: Sighting, R: Array, p_m: Array, blur_px: float) -> EdgePixels | None:
-        """Return the pixels near the edges that a pose predicts; None if too few disks are seen."""
-        seen = [k for k, disk in enumerate(sighting.measured) if disk is not None]
-        G = _plate_from_ray(R, p_m)
-        if len(seen) < _LEAST_DISKS or G is None:
+    def reset(self) -> None:
+        """Forget which colours the camera interpolates."""
+        self._mosaic.reset()
+
+    def __call__(self, sighting: Sighting, blur_px: float) -> EdgePixels | None:
+        """Return the pixels near the edges; None if too few disks are seen."""
+        seen = [(k, disk) for k, disk in enumerate(sighting.measured) if disk is not None]
+        if len(seen) < _LEAST_DISKS:
             return None
-        centers_m = self._layout.centers_m[seen]
-        radius_m = self._layout.radius_m
-        focal_px = self._optics.mean_focal_px
-        # A pixel is longer on a slanted plate: what is too far from the edge says nothing, and does no harm.
-        facing = max(-float(R[:, 2] @ p_m) / math.sqrt(float(p_m @ p_m)), _LEAST_FACING)
-        band_m = (_EDGE_PX + _BLURS * blur_px) * float(p_m[2]) / (focal_px * facing)
-        inner_m = radius_m - min(band_m, _OF_RADIUS * radius_m)
-        outer_m = radius_m + min(band_m, _OF_MARGIN * self._margin_m)
-        nearest_m = float(p_m[2]) + float((centers_m @ R[2, :2]).min()) - radius_m
-        half = math.ceil(outer_m / nearest_m * focal_px * _OFF_AXIS)
-        if 2 * half + 1 > min(self._optics.width_px, self._optics.height_px):
-            return None
-        middles = self._middles(sighting.measured, half)
-        grid, basis = self._patch(half)
-
-        # To choose pixels, the lens is straight enough across one disk.
-        around = self._rays.take(middles[:, None] + self._steps, axis=1)
-        slopes = around[:2, :, 1:] - around[:2, :, :1]
-        frames = np.zeros((len(seen), 3, 3))
-        frames[:, :, 0] = around[:, :, 0].T
-        frames[:, :2, 1:] = slopes.transpose(1, 0, 2)
-        hom = G @ frames
-        hom[:, :2] -= centers_m[:, :, None] * hom[:, 2:]
-        x, y, w = (hom.astype(np.float32) @ basis).transpose(1, 0, 2)
-        rho2 = (x * x + y * y) / (w * w)
-        near = np.flatnonzero((rho2 > np.float32(inner_m * inner_m)) & (rho2 < np.float32(outer_m * outer_m)))
-        owner, local = np.divmod(near, len(grid))
-        index = middles[owner] + grid[local]
-        rays = self._rays.take(index, axis=1)
-        hom_near = G @ rays
-        alpha, contrast = self._coverage(sighting, index, owner, hom_near[:2] / hom_near[2])
-        scales = 1.0 / np.sqrt(np.abs(slopes[0, :, 0] * slopes[1, :, 1] - slopes[0, :, 1] * slopes[1, :, 0]))
-        return EdgePixels(rays, centers_m.T.take(owner, axis=1), alpha, contrast, scales[owner], radius_m)
-
-    def _middles(self, measured: DiskCenters, half: int) -> NDArray[np.intp]:
-        """Return the flat indices of the pixels at the disks' middles, moved so that a patch around them is in the image."""
+        predicted = sighting.predicted
+        # Along the minor axis a pixel is longest on the plate: what is too far from the edge elsewhere does no harm.
+        band = (_EDGE_PX + _BLURS * blur_px) / predicted.minor_px
+        inner, outer = max(1.0 - band, _LEAST_RADIUS), min(1.0 + band, self._widest)
+        half = math.ceil(predicted.extent_px * outer) + 1
         width, height = self._optics.width_px, self._optics.height_px
-        return np.array(
-            [
-                min(max(round(disk.v), half), height - 1 - half) * width + min(max(round(disk.u), half), width - 1 - half)
-                for disk in measured
-                if disk is not None
-            ]
+        if 2 * half + 1 > min(width, height):
+            return None
+        grid, basis = self._patch(half)
+        quadratics, bright, middles = [], [], []
+        for k, disk in seen:
+            u, v = min(max(round(disk.u), half), width - 1 - half), min(max(round(disk.v), half), height - 1 - half)
+            middles.append(v * width + u)
+            quadratics.append(ellipse_quadratic(predicted.disks[k], disk.u - u, disk.v - v))
+            bright.append(_brightness(sighting.light, predicted, self._centers_m[k], (disk.u - u, disk.v - v)))
+        quad = np.array(quadratics, dtype=np.float32) @ basis
+        near = np.flatnonzero((quad > np.float32(inner * inner)) & (quad < np.float32(outer * outer)))
+        owner, local = np.divmod(near, len(grid))
+        index = np.array(middles).take(owner) + grid.take(local)
+        brightness = (np.array(bright, dtype=np.float32) @ basis[:3]).take(near)
+        bounds = np.searchsorted(owner, np.arange(len(seen) + 1)).tolist()
+        self._learn(sighting, half)
+        numbers = [k for k, _ in seen]
+        excess, contrast = self._colors(sighting, index, owner, brightness, numbers)
+        return EdgePixels(
+            rays=self._rays.take(index, axis=1),
+            centers_m=self._layout.centers_m[numbers].T.take(owner, axis=1),
+            spans=[slice(first, last) for first, last in itertools.pairwise(bounds)],
+            excess=excess,
+            contrast=contrast,
+            focal_px=self._scales(sighting, numbers, owner),
+            mean_focal_px=self._optics.mean_focal_px,
+            radius_m=self._layout.radius_m,
         )
 
-    def _patch(self, half: int) -> tuple[NDArray[np.intp], NDArray[np.float32]]:
-        """Return a square patch around its middle: flat indices (n,) and [1, u, v] (3, n)."""
+    def _patch(self, half: int) -> tuple[NDArray[np.intp], Float32]:
+        """Return a square patch around its middle: flat indices (n,) and [1, u, v, u^2, u v, v^2] (6, n)."""
         if half not in self._patches:
             line = np.arange(-half, half + 1)
             v, u = (axis.ravel() for axis in np.meshgrid(line, line, indexing="ij"))
-            basis = np.stack([np.ones_like(u), u, v]).astype(np.float32)
+            basis = np.stack([np.ones_like(u), u, v, u * u, u * v, v * v]).astype(np.float32)
             self._patches[half] = (v * self._optics.width_px + u, basis)
         return self._patches[half]
 
-    def _coverage(
-        self, sighting: Sighting, index: NDArray[np.intp], owner: NDArray[np.intp], place_m: Array
+    def _learn(self, sighting: Sighting, half: int) -> None:
+        if self._mosaic.settled:
+            return
+        disks = sighting.predicted.disks
+        rows, columns = [round(disk.v) for disk in disks], [round(disk.u) for disk in disks]
+        self._mosaic.learn(sighting.image, (min(rows) - half, max(rows) + half), (min(columns) - half, max(columns) + half))
+
+    def _colors(
+        self, sighting: Sighting, index: NDArray[np.intp], owner: NDArray[np.intp], brightness: Float32, seen: list[int]
     ) -> tuple[Array, Array]:
-        """Return the coverage that the pixels show, and what coverage one means in the image.
+        """Return what the pixels show beyond the plate's colour along the step to the disk's, and that step's size.
 
         Args:
             sighting: Image, light and colours.
             index: (n,) flat indices of the pixels.
             owner: (n,) which of the disks seen a pixel belongs to.
-            place_m: (2, n) where the pixels are on the plate.
+            brightness: (n,) of the plate at the pixels.
+            seen: Numbers of the disks seen.
         """
-        light = sighting.light
-        rows = np.array([mixing_rows(light.rgb, disk.relative) for disk in sighting.measured if disk is not None])[:, :, 0]
-        mix = rows[owner]
-        brightness = light.level * (1.0 + light.slope[0] * place_m[0] + light.slope[1] * place_m[1])
+        steps = [_step(sighting.light, disk.relative) for k in seen if (disk := sighting.measured[k]) is not None]
+        channels = self._mosaic.channels
+        if channels is None:
+            table = [(x / size, y / size, z / size, level, size) for (x, y, z), level, size in steps]
+            kind = owner
+        else:
+            # What was interpolated says nothing new: of every pixel the one colour that was measured.
+            plate = sighting.light.rgb
+            table = [(float(c == 0), float(c == 1), float(c == 2), plate[c], step[c]) for step, _, _ in steps for c in range(3)]
+            row, column = np.divmod(index, self._optics.width_px)
+            kind = 3 * owner + channels[row & 1, column & 1]
+        red, green, blue, level, size = np.array(table).T.take(kind, axis=1)
         pixels = sighting.image.reshape(-1, 3).take(index, axis=0)
-        mixed = pixels * mix[:, :3]
-        alpha = (mixed[:, 0] + mixed[:, 1] + mixed[:, 2]) / brightness - mix[:, 3]
-        contrast = brightness / np.sqrt((rows[:, :3] * rows[:, :3]).sum(axis=1))[owner]
-        return alpha, contrast
+        shown = pixels[:, 0] * red
+        shown += pixels[:, 1] * green
+        shown += pixels[:, 2] * blue
+        level *= brightness
+        shown -= level
+        size *= brightness
+        return shown, size
+
+    def _scales(self, sighting: Sighting, seen: list[int], owner: NDArray[np.intp]) -> Array | float:
+        """Return the scale from rays to pixels: of each disk's pixels where the lens is curved, else one for all."""
+        if self._optics.ideal:
+            return self._optics.mean_focal_px
+        fit = sighting.fit
+        scales = []
+        for x, y, z in (self._layout.centers_m[seen] @ fit.R[:, :2].T + fit.p_m).tolist():
+            _, _, ux, uy, vx, vy = self._optics.place(x / z, y / z)
+            scales.append(math.sqrt(abs(ux * vy - uy * vx)))
+        return np.array(scales).take(owner)
 
 
-def _plate_from_ray(R: Array, p_m: Array) -> Array | None:
-    """Return the inverse homography (3, 3), rays to plate coordinates over depth; None if the plate is seen edge on."""
-    distance_m = float(R[:, 2] @ p_m)
-    if abs(distance_m) < 1e-6:
-        return None
-    # (x, y, 1) Z = X r1 + Y r2 + p, and 1/Z = n . (x, y, 1) / (n . p)
-    G = R.T / distance_m
-    G[:2] = R.T[:2] - (p_m @ R[:, :2])[:, None] * G[2]
-    return G
+def _brightness(
+    light: PlateLight, predicted: MarkerImage, place_m: tuple[float, float], place_px: tuple[float, float]
+) -> tuple[float, float, float]:
+    """Return the plate's brightness as coefficients of [1, u, v] of a patch that shows a point of the plate at a place."""
+    (x_m, y_m), (u, v) = place_m, place_px
+    a, b, c, d = predicted.plate_px
+    scale = light.level / (a * d - b * c)
+    slope_u, slope_v = scale * (d * light.slope[0] - c * light.slope[1]), scale * (a * light.slope[1] - b * light.slope[0])
+    middle = light.level * (1.0 + x_m * light.slope[0] + y_m * light.slope[1])
+    return middle - slope_u * u - slope_v * v, slope_u, slope_v
 
 
-def _determinant(M: Array) -> float:
-    (a, b, c), (d, e, f), (g, h, i) = M.tolist()
-    return float(a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g))
+def _step(light: PlateLight, relative: Color) -> tuple[Color, float, float]:
+    """Return the step from the plate's to a disk's colour in units of brightness, the plate's colour along it, and its size."""
+    red, green, blue = light.rgb
+    x, y, z = (relative[0] - 1.0) * red, (relative[1] - 1.0) * green, (relative[2] - 1.0) * blue
+    size = max(math.sqrt(x * x + y * y + z * z), _LEAST_STEP)
+    return (x, y, z), (x * red + y * green + z * blue) / size, size

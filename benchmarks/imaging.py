@@ -1,0 +1,110 @@
+"""Every vision method on images with faults of lens, sensor and print: errors, and whether the covariance knows of them.
+
+Frames of the simulated clinic (`ghest-rt simulate --image …`) in short bursts spread over the movement COMB, both cameras; the
+last frame of each burst is scored against the truth.
+"""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from ghest_drivers.samples import CameraInfo, RgbdFrame
+from ghest_rt.config.station import Marker
+from ghest_rt.geometry.so3 import Array, log_so3
+from ghest_rt.simulation.command import SimulateOptions, build_world
+from ghest_rt.simulation.optics import parse_imaging
+from ghest_rt.vision.factory import Method, make_detector
+
+SensorName = Literal["paper", "sr300"]
+Burst = tuple[CameraInfo, str, Marker, list[RgbdFrame], Array]
+
+CASES: dict[str, tuple[str, ...]] = {
+    "as planned": (),
+    "Bayer": ("bayer",),
+    "defocus 0.8 px": ("defocus:0.8",),
+    "defocus 2 px": ("defocus:2",),
+    "exposure 20 ms": ("motion-blur:0.02",),
+    "k1 -0.08, told": ("distortion:-0.08",),
+    "k1 +0.01, untold": ("untold-distortion:0.01",),
+    "colours off by 12": ("wrong-color:12",),
+    "gain 1.15": ("gain:1.15",),
+    "gamma 1.2": ("gamma:1.2",),
+    "several at once": ("bayer", "defocus:0.8", "wrong-color:12", "gamma:1.1", "motion-blur:0.015"),
+}
+SENSORS: tuple[SensorName, ...] = ("paper", "sr300")
+METHODS: tuple[Method, ...] = ("paper", "aruco", "refined", "photometric")
+_COLORS = {"paper": "#999999", "aruco": "#D55E00", "refined": "#56B4E9", "photometric": "#0072B2"}
+_OUT = Path(__file__).resolve().parents[1] / "out" / "benchmarks" / "imaging.png"
+_FRAMES_PER_BURST = 3
+_SEED = 11
+
+
+def bursts(sensor: SensorName, texts: tuple[str, ...], marker: Literal["disks", "aruco"], count: int) -> Iterator[Burst]:
+    """Yield camera, marker's name, marker, frames and the true pose (4, 4) in the last of them, `count` times per camera."""
+    options = SimulateOptions(out=_OUT, movement="COMB", sensor=sensor, seed=_SEED, marker=marker, imaging=parse_imaging(texts))
+    world = build_world(options)
+    config = world.station.config
+    for name, camera in config.cameras.items():
+        for first in np.linspace(0, world.frame_count(name) - _FRAMES_PER_BURST, count).astype(int).tolist():
+            numbers = range(first, first + _FRAMES_PER_BURST)
+            frames = [frame for k in numbers if (frame := world.frame(name, k)) is not None]
+            pose = world.camera_from_marker(name, world.frame_times(name, numbers[-1]).color_ns)
+            yield world.camera_info(name), camera.marker, config.markers[camera.marker], frames, pose
+
+
+def errors(method: Method, given: list[Burst]) -> tuple[Array, list[float]]:
+    """Return (n, 2) errors in degrees and millimetres of the markers found, and their squared errors over their covariances."""
+    found, nees = [], []
+    for info, name, marker, frames, pose in given:
+        detector = make_detector(method, info.name, name, marker, info)
+        seen = [detector.detect(frame) for frame in frames][-1]
+        if seen.camera_from_marker is None:
+            continue
+        error = np.concatenate(
+            [log_so3(pose[:3, :3] @ seen.camera_from_marker[:3, :3].T), pose[:3, 3] - seen.camera_from_marker[:3, 3]]
+        )
+        found.append((np.rad2deg(np.linalg.norm(error[:3])), 1e3 * np.linalg.norm(error[3:])))
+        if seen.covariance is not None:
+            nees.append(float(error @ np.linalg.solve(seen.covariance, error)))
+    return np.array(found).reshape(-1, 2), nees
+
+
+def run(quick: bool) -> dict[str, Any]:
+    """Return RMS degrees and millimetres and mean NEES per sensor, fault and method; draw out/benchmarks/imaging.png."""
+    count = 4 if quick else 40
+    results: dict[str, Any] = {"poses per cell": 2 * count}
+    figure = Figure(figsize=(11.0, 7.0), layout="constrained")
+    axes = figure.subplots(2, len(SENSORS), sharex=True)
+    for column, sensor in enumerate(SENSORS):
+        rms: dict[str, list[Array]] = {method: [] for method in METHODS}
+        for case, texts in CASES.items():
+            scenes = {code: list(bursts(sensor, texts, code, count)) for code in ("disks", "aruco")}
+            line: dict[str, str] = {}
+            for method in METHODS:
+                given = scenes["aruco" if method == "aruco" else "disks"]
+                found, nees = errors(method, given)
+                rms[method].append(np.sqrt(np.mean(found**2, axis=0)) if len(found) else np.full(2, np.nan))
+                line[method] = "{:.4f} deg {:.4f} mm".format(*rms[method][-1])
+                line[method] += f", NEES {np.mean(nees):.1f}" if nees else ""
+                line[method] += f", {len(given) - len(found)} not found" if len(found) < len(given) else ""
+            results[f"{sensor}, {case}"] = line
+        for row, label in enumerate(("orientation RMS (deg)", "position RMS (mm)")):
+            _draw(axes[row][column], {method: [pair[row] for pair in pairs] for method, pairs in rms.items()}, label)
+        axes[0][column].set_title(f"{sensor} sensor")
+    axes[0][0].legend(fontsize=8)
+    _OUT.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(_OUT, dpi=120)
+    return results
+
+
+def _draw(axis: Any, values: dict[str, list[float]], label: str) -> None:
+    for offset, (method, heights) in enumerate(values.items()):
+        places = np.arange(len(heights)) + 0.2 * (offset - 1.5)
+        axis.bar(places, heights, width=0.2, color=_COLORS[method], label=method)
+    axis.set_yscale("log")
+    axis.set_ylabel(label)
+    axis.set_xticks(np.arange(len(CASES)), list(CASES), rotation=40, ha="right", fontsize=8)
+    axis.grid(axis="y", alpha=0.3)
