@@ -1,5 +1,6 @@
 """Read a station file; every problem is told with file, key path and remedy."""
 
+import stat
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,6 +11,7 @@ from ghest_rt.config.station import StationConfig
 from ghest_rt.errors import BadInputError
 
 _MAX_BYTES = 1_000_000
+_MAX_DOTS = 200  # in one line: the parser's time grows with the square of a dotted key's length
 _REMEDIES = {"missing": "add this key", "extra_forbidden": "remove it or correct its spelling"}
 
 
@@ -36,10 +38,17 @@ def parse_station(toml_text: str, source: str) -> StationConfig:
     Raises:
         BadInputError: Not TOML, or a key is missing, unknown or out of range; names `source` and each key.
     """
+    for number, line in enumerate(toml_text.split("\n"), 1):
+        if line.count(".") > _MAX_DOTS:
+            raise BadInputError(f"{source}: line {number} has more than {_MAX_DOTS} dots; is it a station file?")
     try:
-        return StationConfig.model_validate(tomllib.loads(toml_text))
-    except tomllib.TOMLDecodeError as error:
+        document = tomllib.loads(toml_text)
+    except ValueError as error:  # TOMLDecodeError, and numbers of thousands of digits
         raise BadInputError(f"{source}: not a valid TOML file: {error}") from error
+    except RecursionError as error:
+        raise BadInputError(f"{source}: tables or arrays nested too deeply; is it a station file?") from error
+    try:
+        return StationConfig.model_validate(document)
     except ValidationError as error:
         lines = []
         for item in error.errors(include_url=False):
@@ -67,7 +76,10 @@ def load_station(path: Path) -> LoadedStation:
 
 def _read_text(path: Path, what: str) -> str:
     try:
-        if path.stat().st_size > _MAX_BYTES:
+        facts = path.stat()
+        if not stat.S_ISREG(facts.st_mode):  # a device or a pipe has no end
+            raise BadInputError(f"{path}: {what} is not a file")
+        if facts.st_size > _MAX_BYTES:
             raise BadInputError(f"{path}: {what} is larger than {_MAX_BYTES} bytes; is it the right file?")
         return path.read_text(encoding="utf-8")
     except OSError as error:
