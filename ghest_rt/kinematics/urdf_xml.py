@@ -5,6 +5,11 @@ from xml.parsers import expat
 
 from ghest_rt.errors import BadInputError
 
+# A hundred times what a large robot has: a file beyond it keeps us busy, and is none.
+_MAX_BYTES = 1_000_000
+_MAX_ELEMENTS = 10_000
+_MAX_DEPTH = 32
+
 
 @dataclass(slots=True)
 class Node:
@@ -31,13 +36,23 @@ def parse_xml(text: str, source: str) -> Node:
     """Parse XML text into its root node.
 
     Raises:
-        BadInputError: Not well-formed XML, or it has a DOCTYPE; names `source` and the line.
+        BadInputError: Not well-formed XML, too large, too deep, or it has a DOCTYPE; names `source` and the line.
     """
+    if len(text) > _MAX_BYTES:
+        raise BadInputError(f"{source}: longer than {_MAX_BYTES} characters; is it the right file?")
     document = Node("", {}, 0)
     open_nodes = [document]
+    elements = 0
     parser = expat.ParserCreate()
 
     def start(tag: str, attributes: dict[str, str]) -> None:
+        nonlocal elements
+        elements += 1
+        if elements > _MAX_ELEMENTS or len(open_nodes) > _MAX_DEPTH:
+            raise BadInputError(
+                f"{source}:{parser.CurrentLineNumber}: more than {_MAX_ELEMENTS} elements, or {_MAX_DEPTH} within each other; "
+                "is it a URDF?"
+            )
         node = Node(tag, attributes, parser.CurrentLineNumber)
         open_nodes[-1].children.append(node)
         open_nodes.append(node)
