@@ -80,7 +80,7 @@ class Parts:
         known = self._infos.get(info.name)
         self._infos[info.name] = info
         if known is None:
-            self.writer.add_camera(info, t_ns)
+            self.writer.add_camera(info, t_ns, with_depth=self._with_depth(info.name))
         elif known is not info and not same_camera(known, info):
             self._rotate(t_ns)
 
@@ -124,6 +124,9 @@ class Parts:
             self._closed_bytes = sum(file.stat().st_size for file in self.files if file.exists())
             self._sync.stop(self._settings.drain_s)
 
+    def _with_depth(self, camera: str) -> bool:
+        return camera not in self._station.config.cameras or self._station.config.cameras[camera].depth
+
     def _rotate(self, t_ns: int) -> None:
         self.writer.close()
         self._closed_bytes = sum(file.stat().st_size for file in self.files)
@@ -131,7 +134,7 @@ class Parts:
         self._waiting = set(self._newest_ns)
         self.writer = self._next_part()
         for info in self._infos.values():
-            self.writer.add_camera(info, t_ns)
+            self.writer.add_camera(info, t_ns, with_depth=self._with_depth(info.name))
         if self._grid_t_0_ns is not None:
             self.writer.write_grid(self._grid_t_0_ns)
 

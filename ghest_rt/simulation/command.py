@@ -203,7 +203,7 @@ def simulate(options: SimulateOptions, progress: Callable[[float], None]) -> Sim
         ThreadPoolExecutor(max_workers=len(world.camera_names)) as pool,
     ):
         for camera in world.camera_names:
-            writer.add_camera(world.camera_info(camera), first_ns, with_depth=not options.color_only)
+            writer.add_camera(world.camera_info(camera), first_ns, with_depth=world.station.config.cameras[camera].depth)
         frames = {camera: _render_ahead(world, devices, camera, given, pool) for camera, given in deliveries.items()}
         names = world.encoder_info().joint_names
         rows = 0
@@ -216,8 +216,7 @@ def simulate(options: SimulateOptions, progress: Callable[[float], None]) -> Sim
                     rows += 1
                     writer.write_encoder(sample, names)
             else:
-                frame = next(frames[kind])
-                writer.write_frame(replace(frame, depth_counts=None) if options.color_only else frame)
+                writer.write_frame(next(frames[kind]))
                 progress(done / len(events))
     progress(1.0)
     return SimulationSummary(

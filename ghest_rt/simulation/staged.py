@@ -1,5 +1,7 @@
 """Devices and truth of a moving scene: two cameras and encoders, all on one time axis from 0."""
 
+from dataclasses import replace
+
 import mujoco
 import numpy as np
 
@@ -100,9 +102,12 @@ class StagedWorld:
         return self._cameras[name].times(k)
 
     def frame(self, name: str, k: int) -> RgbdFrame | None:
-        """Return frame `k` of a camera, or None after the end."""
+        """Return frame `k` of a camera, or None after the end; without depth if the station file says `depth = false`."""
         camera = self._cameras[name]
-        return camera.frame(k) if k < camera.frame_count else None
+        if k >= camera.frame_count:
+            return None
+        frame = camera.frame(k)
+        return frame if self.station.config.cameras[name].depth else replace(frame, depth_counts=None)
 
     def render(self, name: str, t_ns: int) -> RgbdFrame:
         """Return what a camera would see at any instant of the movement, as if it exposed colour and depth then.
