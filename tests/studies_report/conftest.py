@@ -1,0 +1,122 @@
+"""A results folder as the studies leave it, with invented errors: nothing is rendered."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from ghest_rt.studies.accuracy.summary import table
+from ghest_rt.studies.compare import CompareSettings, compare
+from ghest_rt.studies.engine.run import Job, Outcome
+from ghest_rt.studies.engine.store import ResultStore
+from ghest_rt.studies.engine.tables import write_summary
+from ghest_rt.studies.engine.task import Result
+from ghest_rt.studies.figures.style import new_figure
+from ghest_rt.studies.latency import LatencySettings, latency
+from ghest_rt.studies.latency_tasks import CANDIDATES
+from ghest_rt.studies.movements import METHODS, Movements
+from ghest_rt.studies.report.compare_figures import draw_angles, draw_contenders
+from ghest_rt.studies.report.latency_figures import draw_latency
+from ghest_rt.studies.report.results import write_results
+from ghest_rt.studies.rivals.angle_errors import QUANTITIES as ANGLE_QUANTITIES
+from ghest_rt.studies.rivals.contenders import CONTENDERS
+from ghest_rt.studies.session.errors import QUANTITIES
+
+
+@dataclass(frozen=True)
+class Invented:
+    """Carries tasks out without doing them."""
+
+    def run(self, jobs: Sequence[Job], store: ResultStore) -> Iterator[Outcome]:
+        for job in jobs:
+            store.save(job.key, Result(_values(job)), 0.0)
+            yield Outcome(job)
+
+
+def _values(job: Job) -> dict[str, object]:
+    if job.task.kind.endswith("compare_session"):
+        errors = {
+            key: {
+                **dict.fromkeys(ANGLE_QUANTITIES, 0.01 if key == "fused" else 0.5 + k),
+                "lag_ms": 45.0,
+                "max_deg": 1.0,
+                "samples": 100,
+                "answered_fraction": 1.0,
+                "angles_judged_fraction": 1.0,
+            }
+            for k, key in enumerate(CONTENDERS)
+        }
+        return {"duration_s": 1.0, "girdle_turn_deg": 4.25, "straight_forecast_deg": 0.125, "contenders": errors}
+    if job.task.kind.endswith("judge_speed"):
+        speed = np.linspace(0.0, 50.0, 60)
+        return {
+            key: {
+                "lag_ms": 0.0,
+                "own_instant_deg": 0.1,
+                "age_ms": {"r0": 15.0, "r1": 14.0, "encoders": None},
+                "speed_dps": speed.tolist(),
+                "published_deg": (0.02 * speed + 0.01).tolist(),
+            }
+            for key in CANDIDATES
+        }
+    return {}
+
+
+def accuracy_summary() -> dict[str, object]:
+    rows: list[dict[str, Any]] = [
+        {"sensor": "paper", "method": method, "quantity": quantity, "movement": m, "seed": seed, "rms": 0.001 + seed, "sd": 0.1}
+        for method in METHODS
+        for quantity in QUANTITIES
+        for m in ("SAbAd", "SFE", "SIR", "COMB")
+        for seed in (1, 2)
+    ]
+    check = {"name": "COMB is <worst>", "holds": False, "evidence": "none", "explanation": "invented"}
+    return {"study": "accuracy", "seeds": [1, 2], "duration_s": None, "cpu_s": 1.0, "table": table(rows), "checks": [check]}
+
+
+def sensitivity_summary() -> dict[str, object]:
+    columns = {
+        "position_m_rms": 0.02,
+        "orientation_deg_rms": 3.456,
+        "S_position": 0.98,
+        "S_orientation": None,
+        "valid_fraction": 1,
+    }
+    shift = {"group": "shift", "parameter": "q1", "what": "m0", "axis": "x", "amount": 0.02, "unit": "m"}
+    turn = {"group": "turn", "parameter": "turn m0 x", "what": "m0", "axis": "x", "amount": 10.0, "unit": "deg"}
+    return {
+        "study": "sensitivity",
+        "paper": {"mean_orientation_deg_at_20_mm": 3.6},
+        "undisturbed": [{"method": m, "orientation_deg_rms": 0.1, "position_m_rms": 0.001} for m in METHODS],
+        "mean_at_largest_shift": [{"method": m, "amount_m": 0.02, "orientation_deg": 2.5, "position_m": 0.01} for m in METHODS],
+        "at_largest": [{"method": m, **of, **columns} for m in METHODS for of in (shift, turn)],
+        "checks": [],
+    }
+
+
+def picture(figure: Any, folder: Path, name: str) -> None:
+    folder.mkdir(parents=True, exist_ok=True)
+    figure.savefig(folder / f"{name}.png", dpi=40)
+
+
+@pytest.fixture(scope="session")
+def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("results")
+    store = ResultStore(folder / "tasks")
+    some = Movements(("SFE", "COMB"))
+    compared = compare(CompareSettings(movements=some), store, Invented())
+    document = write_results(folder, "compare", compared, compared["rows"])  # type: ignore[arg-type]
+    picture(draw_contenders(document, "paper"), folder / "compare" / "figures", "contenders_paper")
+    picture(draw_angles(document, "paper"), folder / "compare" / "figures", "angles_paper")
+    late = latency(LatencySettings(movements=some), store, Invented())
+    document = write_results(folder, "latency", late, late["rows"])  # type: ignore[arg-type]
+    picture(draw_latency(document), folder / "latency" / "figures", "latency")
+    write_summary(accuracy_summary(), folder / "accuracy")
+    write_summary(sensitivity_summary(), folder / "sensitivity")
+    for name in ("drift_by_method", "figure17_COMB_paper", "figure17_COMB_fused", "sobol_COMB", "further"):
+        picture(new_figure(1.0, 1.0), folder / "sensitivity" / "figures", name)
+    picture(new_figure(1.0, 1.0), folder / "accuracy" / "figures", "figure13_paper")
+    return folder

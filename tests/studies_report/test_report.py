@@ -1,0 +1,125 @@
+"""The report: one page, everything in it, nothing from outside."""
+
+import json
+import shutil
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from ghest_rt.cli.main import app
+from ghest_rt.errors import BadInputError
+from ghest_rt.studies.report.page import number
+from ghest_rt.studies.report.write import write_report
+
+
+class Page(HTMLParser):
+    """Collects what a page refers to, its texts, and whether its tags match."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.refers_to: list[str] = []
+        self.texts: list[str] = []
+        self.open: list[str] = []
+        self.ids: list[str] = []
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.refers_to += [value or "" for name, value in attrs if name in {"src", "href", "srcset", "action"}]
+        self.ids += [value or "" for name, value in attrs if name == "id"]
+        if tag not in {"meta", "img", "br", "link"}:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        self.texts.append(data.strip())
+
+
+@pytest.fixture(scope="module")
+def page(results: Path, tmp_path_factory: pytest.TempPathFactory) -> str:
+    out = tmp_path_factory.mktemp("report") / "report.html"
+    assert write_report(results, out) == ["accuracy", "sensitivity", "compare", "latency"]
+    return out.read_text(encoding="utf-8")
+
+
+def test_the_page_needs_nothing_from_outside(page: str) -> None:
+    found = Page(page)
+    assert found.open == []
+    for target in found.refers_to:
+        assert target.startswith("data:image/png;base64,") or target.removeprefix("#") in found.ids
+    assert "<script" not in page
+    assert "@import" not in page
+    assert "url(" not in page
+
+
+def test_every_study_has_its_tables_and_figures(page: str) -> None:
+    text = "\n".join(Page(page).texts)
+    for heading in (
+        "Table 5: position of the markers",
+        "Table 6: pose of the upper arm",
+        "Beyond the paper",
+        "Does fused win?",
+    ):
+        assert heading in text
+    for caption in ("Figure 13", "Figure 17: COMB, method paper", "Figure 17: COMB, method fused", "Errors angle by angle"):
+        assert caption in text
+    assert page.count("data:image/png") == 9
+
+
+def test_the_papers_values_stand_beside_ours(page: str) -> None:
+    texts = Page(page).texts
+    assert "0.889" in texts  # Table 6, mean orientation
+    assert "0.83" not in texts
+    assert "0.830" in texts  # Table 5, mean of m0, in millimetres
+    assert "3.60" in texts  # with markers displaced
+    assert "SFE 3.9, SAA 3.3, SIER 6.5" in texts
+
+
+def test_what_does_not_hold_is_said(page: str) -> None:
+    assert "does not" in Page(page).texts
+    assert "COMB is <worst>" in Page(page).texts
+    assert "<worst>" not in page  # escaped
+
+
+def test_the_same_results_give_the_same_page(results: Path, page: str, tmp_path: Path) -> None:
+    write_report(results, tmp_path / "again.html")
+    assert (tmp_path / "again.html").read_text(encoding="utf-8") == page
+
+
+def test_a_study_that_was_not_run_is_named_with_its_command(results: Path, tmp_path: Path) -> None:
+    shutil.copytree(results / "latency", tmp_path / "latency")
+    out = tmp_path / "report.html"
+    assert write_report(tmp_path, out) == ["latency"]
+    assert "ghest-rt study accuracy" in out.read_text(encoding="utf-8")
+
+
+def test_an_empty_folder_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(BadInputError, match="holds no study"):
+        write_report(tmp_path, tmp_path / "report.html")
+
+
+@pytest.mark.parametrize("content", ["{", "[1]", '{"candidates": []}'])
+def test_a_damaged_summary_is_named_with_the_remedy(tmp_path: Path, content: str) -> None:
+    (tmp_path / "latency").mkdir()
+    (tmp_path / "latency" / "summary.json").write_text(content)
+    with pytest.raises(BadInputError, match=r"latency.*run `ghest-rt study latency` again"):
+        write_report(tmp_path, tmp_path / "report.html")
+
+
+def test_the_command_tells_what_it_wrote(results: Path, tmp_path: Path) -> None:
+    out = tmp_path / "r.html"
+    result = CliRunner().invoke(app, ["study", "report", str(results), "--out", str(out), "--json"])
+    assert result.exit_code == 0, result.output
+    document = json.loads(result.stdout)
+    assert document["studies"] == ["accuracy", "sensitivity", "compare", "latency"]
+    assert document["size_bytes"] == out.stat().st_size
+
+
+@pytest.mark.parametrize(
+    ("value", "text"), [(None, "–"), (0.0042, "0.004"), (0.123, "0.123"), (1.2345, "1.23"), (12.345, "12.3"), (1234.5, "1234")]
+)
+def test_numbers_have_three_digits_or_so(value: float | None, text: str) -> None:
+    assert number(value) == text
