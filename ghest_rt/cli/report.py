@@ -8,7 +8,6 @@ from rich.console import Console
 from rich.table import Table
 
 from ghest_rt.cli.console import print_json, unused_in_words
-from ghest_rt.cli.recording import print_recorded, recorded_document
 from ghest_rt.cli.scoreboard import Scoreboard
 from ghest_rt.messages.published import Lateness
 from ghest_rt.service.contract import ServiceSummary
@@ -94,6 +93,8 @@ def print_reports(
     console: Console, reports: Sequence[RunReport], as_json: bool, recorded: RecorderCounts | None = None
 ) -> None:
     """Print the reports, and what was recorded, as a table or as one JSON document on standard output."""
+    from ghest_rt.cli.recording import print_recorded, recorded_document  # noqa: PLC0415  (a start need not wait for it)
+
     if as_json:
         runs = {"runs": [_document(report) for report in reports]}
         print_json(runs if recorded is None else {**runs, "recording": recorded_document(recorded)})

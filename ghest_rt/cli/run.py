@@ -2,6 +2,7 @@
 
 import logging
 import time
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,7 +13,6 @@ from ghest_rt.cli.extras import need_simulation
 from ghest_rt.cli.live import LiveFacts, LiveView
 from ghest_rt.cli.options import Method, Movement
 from ghest_rt.cli.publishing import Publishing
-from ghest_rt.cli.recording import RecordOptions, live_recording
 from ghest_rt.cli.report import print_reports, report_of
 from ghest_rt.cli.scoreboard import Scoreboard
 from ghest_rt.config.devices import SimBackend
@@ -26,14 +26,15 @@ from ghest_rt.service.compose import AnglesComposer, Numbering
 from ghest_rt.service.contract import ServiceSettings
 from ghest_rt.service.devices import make_devices, uses_simulation
 from ghest_rt.service.loop import Service
-from ghest_rt.service.metrics import metrics_endpoint
 from ghest_rt.service.notify import service_manager
 from ghest_rt.service.outputs import Output
 from ghest_rt.service.run import run_service
 from ghest_rt.service.stop_signals import StopSignals
 
 if TYPE_CHECKING:
+    from ghest_rt.cli.recording import LiveRecording, RecordOptions
     from ghest_rt.cli.sim_world import LiveWorld
+    from ghest_rt.service.metrics import MetricsEndpoint
 
 _SIM_LEAD_NS = 1_000_000_000  # from building the simulated clinic to the first movement
 
@@ -62,7 +63,7 @@ class RunOptions:
     as_json: bool
     movement: Movement
     seed: int
-    record: RecordOptions | None = None
+    record: "RecordOptions | None" = None
 
 
 def run_station(options: RunOptions) -> None:
@@ -85,8 +86,8 @@ def run_station(options: RunOptions) -> None:
     with (
         StopSignals() as stop,
         Publishing(config.publisher, options.listen, options.publish, False, options.station.parent) as publishing,
-        live_recording(options.record, station, clock) as recording,
-        metrics_endpoint(config) as metrics,
+        _recording(options, station, clock) as recording,
+        _metrics(config) as metrics,
     ):
         facts = LiveFacts(config.station.id, method, publishing.endpoints, f"ghest/{config.station.id}/gh/angles")
         publisher = publishing.publisher_for(config)
@@ -128,6 +129,28 @@ def _refuse_replay(config: StationConfig, path: Path) -> None:
     for key, device in {**devices, "encoders": config.encoders.device}.items():
         if device.backend == "replay":
             raise BadInputError(f"{path}: {key}.device.backend is replay; use ghest-rt --replay RECORDING --station {path}")
+
+
+# What follows is imported only where it is wanted: after a crash every tenth of a second counts.
+
+
+def _recording(
+    options: RunOptions, station: LoadedStation, clock: ScaledClock
+) -> "AbstractContextManager[LiveRecording | None]":
+    if options.record is None:
+        return nullcontext()
+    from ghest_rt.cli.recording import live_recording  # noqa: PLC0415
+
+    return live_recording(options.record, station, clock)
+
+
+def _metrics(config: StationConfig) -> "AbstractContextManager[MetricsEndpoint | None]":
+    address = config.metrics.address
+    if address is None:
+        return nullcontext()
+    from ghest_rt.service.metrics import MetricsEndpoint  # noqa: PLC0415
+
+    return MetricsEndpoint(config.station.id, address)
 
 
 def _world(station: LoadedStation, options: RunOptions, start_ns: int) -> "LiveWorld | None":

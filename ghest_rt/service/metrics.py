@@ -13,14 +13,12 @@ import threading
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, nullcontext
 from http.server import BaseHTTPRequestHandler, HTTPServer
 from types import TracebackType
 from typing import Any, Self
 
 from ghest_rt import __version__
 from ghest_rt.config.metrics import Address
-from ghest_rt.config.station import StationConfig
 from ghest_rt.errors import GhestError
 from ghest_rt.messages.published import Event, GhAngles, Health
 from ghest_rt.messages.results import GhEstimate
@@ -103,12 +101,6 @@ class MetricsEndpoint:
         newest = self._newest
         health, age_s = (None, None) if newest is None else (newest[0], (self._now_ns() - newest[1]) * 1e-9)
         yield from families(self._station, __version__, health, age_s, dict(self._events))
-
-
-def metrics_endpoint(config: StationConfig) -> AbstractContextManager[MetricsEndpoint | None]:
-    """Return the endpoint that the station file asks for; None, once entered, if it asks for none."""
-    address = config.metrics.address
-    return nullcontext() if address is None else MetricsEndpoint(config.station.id, address)
 
 
 class _Once:
