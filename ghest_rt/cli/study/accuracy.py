@@ -81,7 +81,7 @@ def _show(entries: list[dict[str, Any]], checks: list[dict[str, Any]], folder: P
     from ghest_rt.cli.study.running import show_checks
 
     shown = Table(
-        title="RMS error, mean over seeds ± half the 95 % confidence interval (3.4.2, Tables 5 and 6)",
+        title="RMS errors, mean over seeds, ± half its 95 % confidence interval (Tables 5, 6)",
         title_justify="left",
         box=box.SIMPLE_HEAD,
         pad_edge=False,
@@ -112,7 +112,7 @@ def _cell(entry: dict[str, Any], quantity: str) -> str:
     if entry["rms_low"] is None:
         return _number(entry["rms"], quantity)
     half = (entry["rms_high"] - entry["rms_low"]) / 2
-    return f"{_number(entry['rms'], quantity)}±{_number(half, quantity, digits=2)}"
+    return f"{_number(entry['rms'], quantity)}\n±{_number(half, quantity, digits=2)}"
 
 
 def _number(value: float | None, quantity: str, digits: int = 3) -> str:

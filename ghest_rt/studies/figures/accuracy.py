@@ -50,14 +50,15 @@ def draw_figure_13(rows: Sequence[dict[str, object]], sensor: str) -> Any:
                 whiskerprops={"color": color},
                 capprops={"color": color},
             )
-            axes.plot([], [], color=color, linewidth=6, alpha=0.55, label=f"{method}, measured here")
+            axes.plot([], [], color=color, linewidth=6, alpha=0.55, label=f"method {method}")
         if sensor == "paper":
             for k, movement in enumerate(movements):
                 if movement in ACCURACY[quantity]:
                     rms = scale * ACCURACY[quantity][movement].rms
                     axes.plot([k - 0.42, k + 0.42], [rms, rms], color="0.25", linewidth=1.4, linestyle=(0, (4, 2)))
-            axes.plot([], [], color="0.25", linewidth=1.4, linestyle=(0, (4, 2)), label="the paper's RMS (Tables 5, 6)")
+            axes.plot([], [], color="0.25", linewidth=1.4, linestyle=(0, (4, 2)), label="published RMS (Tables 5, 6)")
         axes.set_yscale("log")
+        axes.yaxis.set_major_formatter("{x:g}")
         axes.set_title(title)
         axes.set_ylabel(label)
         axes.set_xticks(range(len(movements)), movements)

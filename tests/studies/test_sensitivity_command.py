@@ -1,0 +1,69 @@
+"""`ghest-rt study sensitivity`: results as files, figures, one document."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import cv2
+import pytest
+from typer.testing import CliRunner
+
+from ghest_rt.cli.main import app
+from ghest_rt.errors import BadInputError
+from ghest_rt.studies.figures.sensitivity import draw_further, draw_sobol
+from ghest_rt.studies.figures.style import save_figure
+from ghest_rt.studies.sensitivity.parameters import further_parameters
+from ghest_rt.studies.sensitivity.sobol import sobol_parameters
+
+
+def test_the_command_prints_one_document_and_writes_the_papers_figures(tmp_path: Path) -> None:
+    arguments = ["study", "sensitivity", "--out", str(tmp_path), "--movement", "SIR", "--duration", "0.2", "--quick"]
+    arguments += ["--paper-only", "--method", "paper", "--method", "refined", "--workers", "1"]
+    result = CliRunner().invoke(app, [*arguments, "--json"], catch_exceptions=False)
+    assert result.exit_code == 0
+    document = json.loads(result.stdout)
+    assert document["paper"] == {"step_m": 0.002, "steps": 10, "mean_orientation_deg_at_20_mm": 3.6}
+    assert len(document["rows"]) == 2 * 6 * 4
+    assert {row["parameter"] for row in document["at_largest"]} == {"q1", "q2", "q3", "q4", "q5", "q6"}
+    folder = tmp_path / "sensitivity"
+    assert json.loads((folder / "summary.json").read_text()) == document
+    assert (folder / "rows.csv").is_file()
+    assert (folder / "rows.parquet").is_file()
+    for name in ("drift_by_method", "figure16_SIR_paper", "figure16_SIR_refined"):
+        image = cv2.imread(str(folder / "figures" / f"{name}.png"))
+        assert image is not None
+        assert image.std() > 15
+    again = CliRunner().invoke(app, arguments, catch_exceptions=False)
+    assert "q6 (m1 z)" in again.stdout
+
+
+def test_figures_beyond_the_papers_are_drawn(tmp_path: Path) -> None:
+    rows: list[dict[str, Any]] = [
+        {
+            "movement": "SFE",
+            "method": method,
+            "group": p.group,
+            "parameter": p.name,
+            "amount": amount,
+            "unit": p.unit,
+            "orientation_deg_rms": None if p.group == "both" and method == "paper" else 100 * amount,
+        }
+        for p in further_parameters()
+        for method in ("paper", "refined")
+        for amount in (0.0, 0.02)
+    ]
+    indices: list[dict[str, Any]] = [
+        {"movement": "SFE", "output": output, "parameter": p.name, "S1": 0.1, "S1_conf": 0.02, "ST": 0.2, "ST_conf": 0.02}
+        for output in ("position_m", "orientation_deg")
+        for p in sobol_parameters()
+    ]
+    for name, figure in (("further", draw_further(rows)), ("sobol", draw_sobol(indices, "SFE"))):
+        paths = save_figure(figure, tmp_path, name)
+        assert [path.suffix for path in paths] == [".png", ".svg", ".pdf"]
+        assert all(path.stat().st_size > 5000 for path in paths)
+
+
+def test_a_number_of_samples_that_sobol_cannot_use_is_refused(tmp_path: Path) -> None:
+    arguments = ["study", "sensitivity", "--out", str(tmp_path), "--sobol-samples", "100"]
+    with pytest.raises(BadInputError, match="power of two"):
+        CliRunner().invoke(app, arguments, catch_exceptions=False)
