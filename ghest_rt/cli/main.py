@@ -367,6 +367,22 @@ def decrypt(
     open_sealed(sealed, key, out)
 
 
+@app.command()
+def gateway(
+    identity: Annotated[
+        Path, typer.Option(metavar="FOLDER", help="Of a router or a station, made by certs issue", show_default=False)
+    ],
+    listen: Annotated[list[str], typer.Option(metavar="ENDPOINT", help="For the network; may be repeated")] = ["tls/0.0.0.0:7447"],  # noqa: B006
+    station: Annotated[
+        list[str], typer.Option(metavar="ENDPOINT", help="A station of this machine; may be repeated")
+    ] = ["tcp/127.0.0.1:7447"],  # noqa: B006
+) -> None:
+    """Let therapy software on other machines reach the stations of this one (needs the extra 'security')."""
+    from ghest_rt.cli.gateway import run_gateway
+
+    run_gateway(identity, listen, station)
+
+
 @app.command("recording-key")
 def recording_key(
     out: Annotated[Path, typer.Option(metavar="FILE", help="Where the secret key goes", show_default=False)],
