@@ -311,12 +311,15 @@ def status(
         float, typer.Option("--wait", min=0.1, metavar="SECONDS", help="How long to wait for what they say")
     ] = 3.0,
     watch: Annotated[bool, typer.Option("--watch", "-w", metavar="", help="Go on until stopped")] = False,
+    identity: Annotated[
+        Path | None, typer.Option(metavar="FOLDER", help="Who you are, for endpoints with TLS", show_default=False)
+    ] = None,
     as_json: _Json = False,
 ) -> None:
     """Say how the running stations are; exit code 3 if there is none."""
     from ghest_rt.cli.status import show_status
 
-    show_status(tuple(connect or ["tcp/127.0.0.1:7447"]), station, wait_s, watch, as_json)
+    show_status(tuple(connect or ["tcp/127.0.0.1:7447"]), station, identity, wait_s, watch, as_json)
 
 
 @app.command()
@@ -372,10 +375,12 @@ def gateway(
     identity: Annotated[
         Path, typer.Option(metavar="FOLDER", help="Of a router or a station, made by certs issue", show_default=False)
     ],
-    listen: Annotated[list[str], typer.Option(metavar="ENDPOINT", help="For the network; may be repeated")] = ["tls/0.0.0.0:7447"],  # noqa: B006
-    station: Annotated[
-        list[str], typer.Option(metavar="ENDPOINT", help="A station of this machine; may be repeated")
-    ] = ["tcp/127.0.0.1:7447"],  # noqa: B006
+    listen: Annotated[list[str], typer.Option(metavar="ENDPOINT", help="For the network; may be repeated")] = [
+        "tls/0.0.0.0:7447"
+    ],  # noqa: B006
+    station: Annotated[list[str], typer.Option(metavar="ENDPOINT", help="A station of this machine; may be repeated")] = [
+        "tcp/127.0.0.1:7447"
+    ],  # noqa: B006
 ) -> None:
     """Let therapy software on other machines reach the stations of this one (needs the extra 'security')."""
     from ghest_rt.cli.gateway import run_gateway

@@ -4,6 +4,7 @@ import json
 import threading
 import time
 from dataclasses import dataclass
+from pathlib import Path
 
 import zenoh
 from pydantic import ValidationError
@@ -16,6 +17,7 @@ from ghest_rt.cli.console import print_json
 from ghest_rt.errors import DeviceError
 from ghest_rt.messages.published import Event, Health, InputState
 from ghest_rt.messages.results import Reason, Status
+from ghest_rt.security.identity import use_identity
 from ghest_rt.service.stop_signals import StopSignals
 from ghest_rt.service.zenoh_session import open_session
 
@@ -98,23 +100,26 @@ class StationWatch:
             self._state(sample).alive = sample.kind == zenoh.SampleKind.PUT
 
 
-def show_status(endpoints: tuple[str, ...], station: str, wait_s: float, watch: bool, as_json: bool) -> None:
+def show_status(
+    endpoints: tuple[str, ...], station: str, identity: Path | None, wait_s: float, watch: bool, as_json: bool
+) -> None:
     """Print how the stations are; once, or until a signal comes.
 
     Args:
         endpoints: Where to ask: of services, or of a router.
         station: Of this station only; "*" of all.
+        identity: Folder of who asks, for TLS.
         wait_s: How long to wait for what they say.
         watch: Go on and draw anew.
         as_json: One JSON document (while watching: one a second, a line each).
 
     Raises:
-        BadInputError: An endpoint is malformed.
+        BadInputError: An endpoint is malformed, or the identity cannot be used.
         DeviceError: No station is alive.
         GhestError: Zenoh cannot open a session.
     """
     known = StationWatch(station)
-    session, _ = open_session(connect=endpoints)
+    session, _ = open_session(connect=endpoints, identity=None if identity is None else use_identity(identity))
     with StopSignals() as stop, session:
         kept = known.listen(session)
         _wait_for_all(known, wait_s, stop)
