@@ -13,9 +13,9 @@ from ghest_rt.client import (
     LinkCause,
     LinkChanged,
     LinkState,
+    Refused,
     Restarted,
     Sample,
-    Unreadable,
     Update,
 )
 from ghest_rt.messages.published import GhAngles
@@ -77,7 +77,7 @@ def note_of(update: Update) -> str | None:
             return f"connected to {update.endpoint}"
         case ConnectionChanged():
             return f"not connected to {update.endpoint}: {update.detail}"
-        case Unreadable():
+        case Refused():
             return f"{update.station}: {update.detail}"
         case EventReport():
             return f"{update.station}: {update.message.severity}: {update.message.source}: {update.message.message}"

@@ -12,9 +12,9 @@ from ghest_rt.client.updates import (
     LinkCause,
     LinkChanged,
     LinkState,
+    Refused,
     Restarted,
     Sample,
-    Unreadable,
     Update,
 )
 
@@ -29,9 +29,10 @@ __all__ = [
     "LinkCause",
     "LinkChanged",
     "LinkState",
+    "Refused",
+    "Refused",
     "Restarted",
     "Sample",
-    "Unreadable",
     "Update",
     "Updates",
 ]

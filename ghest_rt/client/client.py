@@ -97,7 +97,7 @@ class GhestClient:
         Args:
             capacity: How many updates wait for a receiver that does not take them, before the oldest are dropped.
         """
-        receiver = Updates(capacity, self._hub.leave)
+        receiver = Updates(capacity)
         self._hub.join(receiver)
         return receiver
 

@@ -132,19 +132,17 @@ class Connection:
         told = ""
         while not self._stop.is_set():
             try:
-                session, _ = open_session(connect=(self._endpoint,), identity=self._identity, mode="client")
-            except GhestError as error:
-                detail = str(error)
-                if detail != told:
-                    told = detail
-                    self._deliver(Arrival(Kind.DISCONNECTED, self._endpoint, payload=detail.encode()))
+                self._session, _ = open_session(connect=(self._endpoint,), identity=self._identity, mode="client")
+                self._subscribe(self._session)
+            except (GhestError, zenoh.ZError) as error:
+                if str(error) != told:
+                    told = str(error)
+                    self._deliver(Arrival(Kind.DISCONNECTED, self._endpoint, payload=told.encode()))
                 self._stop.wait(_RETRY_S)
-                continue
-            self._subscribe(session)
-            return
+            else:
+                return
 
     def _subscribe(self, session: zenoh.Session) -> None:
-        self._session = session
         session.info.declare_transport_events_listener(self._on_transport, history=True)
         for station in self._stations:
             for tail, kind in _TAILS.items():

@@ -9,9 +9,9 @@ from typing import Final
 from ghest_rt.client.connection import Arrival, Connection, Kind
 from ghest_rt.client.limits import Limits
 from ghest_rt.client.mailbox import Updates
-from ghest_rt.client.reading import UnreadableError, read_message, read_page
+from ghest_rt.client.reading import RefusedError, read_message, read_page
 from ghest_rt.client.station_tracker import StationTracker
-from ghest_rt.client.updates import ConnectionChanged, EventReport, HealthReport, Sample, Unreadable, Update
+from ghest_rt.client.updates import ConnectionChanged, EventReport, HealthReport, Refused, Sample, Update
 from ghest_rt.messages.published import Event, GhAngles, Health
 
 _log = logging.getLogger(__name__)
@@ -47,9 +47,8 @@ class Hub:
         self._connections: Mapping[str, Connection] = {}
         self._connected: dict[str, ConnectionChanged] = {}
         self._last_told: dict[str, Sample] = {}
-        self._complaints: set[Unreadable] = set()
+        self._refused: set[Refused] = set()
         self._receivers: tuple[Updates, ...] = ()
-        self._left: set[Updates] = set()
         self._thread = threading.Thread(target=self._work, name="ghest-client", daemon=True)
         for station in named:
             self._tracker(station)
@@ -75,26 +74,25 @@ class Hub:
         """Tell a receiver everything from now on, beginning with how things stand."""
         self._items.put(receiver)
 
-    def leave(self, receiver: Updates) -> None:
-        """Tell a receiver nothing more."""
-        self._left.add(receiver)
-
     def _work(self) -> None:
-        while True:
-            try:
-                item = self._items.get(timeout=self._pause_s())
-            except queue.Empty:
-                pass
-            else:
-                if item is None:
-                    break
-                if isinstance(item, Updates):
-                    self._welcome(item)
-                else:
-                    self._handle(*item)
-            self._look_at_clock()
-        for receiver in self._receivers:
-            receiver.end()
+        try:
+            while self._take():
+                self._look_at_clock()
+        finally:
+            for receiver in self._receivers:
+                receiver.close()
+
+    def _take(self) -> bool:
+        """Wait for the next item and see to it; false at the end."""
+        try:
+            item = self._items.get(timeout=self._pause_s())
+        except queue.Empty:
+            return True
+        if isinstance(item, Updates):
+            self._welcome(item)
+        elif item is not None:
+            self._handle(*item)
+        return item is not None
 
     def _pause_s(self) -> float:
         deadlines = (tracker.deadline_ns for tracker in self.trackers.values())
@@ -121,25 +119,22 @@ class Hub:
         self._receivers = (*self._receivers, receiver)
 
     def _tell(self, updates: Sequence[Update]) -> None:
-        if self._left:
-            gone, self._left = self._left, set()
-            self._receivers = tuple(receiver for receiver in self._receivers if receiver not in gone)
         for update in updates:
             if isinstance(update, Sample):
                 self._last_told[update.station] = update
-            for receiver in self._receivers:
-                receiver.put(update)
+            elif isinstance(update, Refused):
+                if update in self._refused or len(self._refused) >= _MOST_COMPLAINTS:
+                    continue
+                self._refused.add(update)
+            self._receivers = tuple([receiver for receiver in self._receivers if receiver.put(update)])
 
     def _handle(self, t_ns: int, arrival: Arrival) -> None:
         if arrival.station and arrival.station not in self.trackers and len(self.trackers) >= _MOST_STATIONS:
             return
         try:
             self._tell(self._read(t_ns, arrival))
-        except UnreadableError as error:
-            unreadable = Unreadable(arrival.station, str(error))
-            if unreadable not in self._complaints and len(self._complaints) < _MOST_COMPLAINTS:
-                self._complaints.add(unreadable)
-                self._tell([unreadable])
+        except RefusedError as error:
+            self._tell([Refused(arrival.station, str(error))])
 
     def _read(self, t_ns: int, arrival: Arrival) -> list[Update]:
         match arrival.kind:

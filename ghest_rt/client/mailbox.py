@@ -1,6 +1,7 @@
 """Updates on their way to one receiver: bounded, so that a slow receiver costs itself samples and nobody else anything."""
 
 import asyncio
+import contextlib
 import logging
 import threading
 from collections import deque
@@ -21,11 +22,10 @@ class Updates:
     Who does not take them in time loses the oldest, and is told which samples by a `Gap`.
     """
 
-    def __init__(self, capacity: int, on_close: "Callable[[Updates], None]") -> None:
+    def __init__(self, capacity: int) -> None:
         if capacity < 1:
             raise ValueError("capacity must be at least 1")
         self._capacity = capacity
-        self._on_close = on_close
         self._changed = threading.Condition()
         self._waiting: deque[Update] = deque()
         self._overrun: dict[tuple[str, str], Gap] = {}
@@ -41,24 +41,20 @@ class Updates:
 
     def close(self) -> None:
         """Take no more; what has come can still be read."""
-        self._on_close(self)
-        self.end()
-
-    def end(self) -> None:
-        """Let the receiver know that nothing more comes (called by the client)."""
         with self._changed:
             self._closed = True
             self._notify()
 
-    def put(self, update: Update) -> None:
-        """Add an update (called by the client); never waits for the receiver."""
+    def put(self, update: Update) -> bool:
+        """Add an update (called by the client) without waiting for the receiver; return whether it still takes any."""
         with self._changed:
             if self._closed:
-                return
+                return False
             if len(self._waiting) >= self._capacity:
                 self._drop(self._waiting.popleft())
             self._waiting.append(update)
             self._notify()
+            return True
 
     def get(self, timeout_s: float | None = None) -> Update | None:
         """Return the next update, waiting for it; None when time is up or nothing more comes."""
@@ -117,7 +113,7 @@ class Updates:
         if self._wake is not None:
             loop, arrived = self._wake
             self._wake = None
-            if not loop.is_closed():
+            with contextlib.suppress(RuntimeError):  # the loop was closed
                 loop.call_soon_threadsafe(arrived.set)
 
 

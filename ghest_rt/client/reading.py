@@ -1,7 +1,7 @@
 """From payloads to messages. Fields that a later version added are passed over; what cannot be understood is an error."""
 
 import json
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from pydantic import BaseModel, ValidationError
 
@@ -12,7 +12,11 @@ _Model = TypeVar("_Model", bound=BaseModel)
 _VERSION = 1
 
 
-class UnreadableError(Exception):
+class _Page(BaseModel):
+    samples: list[GhAngles]
+
+
+class RefusedError(Exception):
     """A payload is no message that this version knows; the text says what to do."""
 
 
@@ -20,25 +24,24 @@ def read_message(model: type[_Model], payload: bytes) -> _Model:
     """Return a message.
 
     Raises:
-        UnreadableError: It is none, or of a later schema version.
+        RefusedError: It is none, or of a later schema version.
     """
     try:
         return model.model_validate_json(payload, extra="ignore")
     except ValidationError as error:
-        raise UnreadableError(_reason(model, payload, error)) from error
+        raise RefusedError(_reason(model, payload, error)) from error
 
 
 def read_page(payload: bytes) -> list[GhAngles]:
     """Return the samples of an answer of `gh/recent`.
 
     Raises:
-        UnreadableError: It is none.
+        RefusedError: It is none.
     """
     try:
-        documents: list[Any] = json.loads(payload)["samples"]
-        return [GhAngles.model_validate_json(json.dumps(document), extra="ignore") for document in documents]
-    except (ValueError, KeyError, TypeError) as error:
-        raise UnreadableError("the answer to the question for missing samples is not of this version") from error
+        return _Page.model_validate_json(payload, extra="ignore").samples
+    except ValidationError as error:
+        raise RefusedError("the answer to the question for missing samples is not of this version") from error
 
 
 def _reason(model: type[BaseModel], payload: bytes, error: ValidationError) -> str:

@@ -54,6 +54,10 @@ class Sequence:
         """When `expire` wants to be called; None if nothing is waited for."""
         return None if self._asked is None else self._deadline_ns
 
+    def is_past(self, run_id: str) -> bool:
+        """Whether a run has been followed by another one."""
+        return run_id in self._past_runs
+
     def take_request(self) -> FillRequest | None:
         """Return what to ask for now, once."""
         request, self._to_send = self._to_send, None
@@ -87,7 +91,7 @@ class Sequence:
         for sample in samples:
             self._hold(sample)
         newest = samples[-1].message.seq if samples else request.last_seq
-        if newest < request.last_seq:
+        if request.first_seq <= newest < request.last_seq:
             self._ask(FillRequest(request.station, request.run_id, newest + 1, request.last_seq), t_ns)
             return []
         return self._conclude(request.last_seq) + self._advance(t_ns)

@@ -6,8 +6,10 @@ from ghest_rt.client.delay import DelayMeter
 from ghest_rt.client.limits import Limits
 from ghest_rt.client.liveness import Liveness
 from ghest_rt.client.sequence import FillRequest, Sequence
-from ghest_rt.client.updates import LinkChanged, Sample, Update
+from ghest_rt.client.updates import LinkChanged, Refused, Sample, Update
 from ghest_rt.messages.published import GhAngles
+
+_TWO_SERVICES = "do two services publish under this station's id? Give each its own (station.id)"
 
 
 class StationTracker:
@@ -42,10 +44,15 @@ class StationTracker:
 
     def on_message(self, endpoint: str, message: GhAngles, t_ns: int) -> list[Update]:
         """A sample came by itself at `t_ns`."""
+        if self._sequence.is_past(message.run_id):
+            return [
+                Refused(self._station, f"samples of run {message.run_id} come after those of {self._run_id}: {_TWO_SERVICES}")
+            ]
         if message.run_id != self._run_id or self._stepped_back(message):
             self._run_id, self._delay = message.run_id, DelayMeter()
         sample = Sample(self._station, message, t_ns, self._delay.measure(t_ns, message.t_publish_ns) * 1e-6)
-        self.newest = sample
+        if self.newest is None or self.newest.message.run_id != message.run_id or self.newest.message.seq < message.seq:
+            self.newest = sample
         ordered = self._sequence.accept(sample, t_ns)
         return [*_told(self._liveness.on_sample(endpoint, sample.delay_ms, t_ns)), *ordered]
 

@@ -132,12 +132,12 @@ class ConnectionChanged:
 
 
 @dataclass(frozen=True, slots=True)
-class Unreadable:
-    """A message that this version cannot read; told once for every reason.
+class Refused:
+    """Messages that are not taken; told once for every reason.
 
     Attributes:
         station: Whose.
-        detail: What is wrong with it and what to do.
+        detail: What is wrong with them and what to do.
     """
 
     station: str
@@ -160,4 +160,4 @@ class EventReport:
     message: Event
 
 
-Update = Sample | Gap | Restarted | LinkChanged | ConnectionChanged | Unreadable | HealthReport | EventReport
+Update = Sample | Gap | Restarted | LinkChanged | ConnectionChanged | Refused | HealthReport | EventReport

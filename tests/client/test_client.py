@@ -12,9 +12,9 @@ from ghest_rt.client import (
     GhestClient,
     LinkCause,
     LinkState,
+    Refused,
     Restarted,
     Sample,
-    Unreadable,
     Update,
 )
 from ghest_rt.errors import BadInputError, GhestError
@@ -208,7 +208,7 @@ def test_a_message_that_cannot_be_read_is_told_once() -> None:
             station.session.put("ghest/one/gh/angles", b'{"schema_version": 2}')
         station.publish(3)
         told.wait(lambda: told.seqs()[-1] == station.next_seq - 1)
-        assert len([update for update in told.all if isinstance(update, Unreadable)]) == 1
+        assert len([update for update in told.all if isinstance(update, Refused)]) == 1
 
 
 def test_a_receiver_that_joins_later_is_told_how_things_stand_and_one_that_left_nothing() -> None:
@@ -267,3 +267,21 @@ def test_a_recording_that_begins_again_is_no_delay() -> None:
             time.sleep(0.002)
         told.wait(lambda: told.seqs()[-1] == first_seq + 49)
         assert max(sample.delay_ms for sample in told.samples() if sample.message.seq >= first_seq) < 150.0
+
+
+def test_a_second_service_under_the_same_id_is_told_and_its_angles_are_not_mixed_in() -> None:
+    with (
+        FakeStation(run_id="first") as first,
+        FakeStation(run_id="second") as second,
+        GhestClient((first.endpoint, second.endpoint)) as client,
+    ):
+        told = Told(client.updates())
+        first.publish_until(lambda: client.latest() is not None)
+        second.publish_until(lambda: any(sample.message.run_id == "second" for sample in told.samples()))
+        first.publish_until(lambda: any(isinstance(update, Refused) for update in told.all))
+        (refused,) = [update for update in told.all if isinstance(update, Refused)]
+        assert "two services" in refused.detail and "station.id" in refused.detail
+        second.publish_until(lambda: client.latest() is not None)
+        first.publish(5)
+        latest = client.latest()
+        assert latest is not None and latest.message.run_id == "second"

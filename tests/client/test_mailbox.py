@@ -21,7 +21,7 @@ def everything(updates: Updates) -> list[Update]:
 
 
 def make(capacity: int) -> Updates:
-    return Updates(capacity, lambda updates: None)
+    return Updates(capacity)
 
 
 def test_what_was_not_taken_in_time_is_told_as_one_gap_before_the_rest() -> None:
@@ -53,9 +53,9 @@ def test_get_gives_up_when_time_is_up_and_when_nothing_more_comes() -> None:
     updates = make(3)
     assert updates.get(0.01) is None
     assert not updates.closed
-    updates.put(sample(0))
-    updates.end()
-    updates.put(sample(1))  # too late
+    assert updates.put(sample(0))
+    updates.close()
+    assert not updates.put(sample(1))
     assert updates.get() == sample(0)
     assert updates.get() is None
     assert updates.closed
@@ -67,7 +67,7 @@ async def test_an_asynchronous_receiver_gets_them_from_another_thread_and_then_t
     def feed() -> None:
         for seq in range(5):
             updates.put(sample(seq))
-        updates.end()
+        updates.close()
 
     feeding = asyncio.get_running_loop().run_in_executor(None, feed)
     assert [update async for update in updates] == [sample(seq) for seq in range(5)]

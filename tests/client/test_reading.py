@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from ghest_rt.client.reading import UnreadableError, read_message, read_page
+from ghest_rt.client.reading import RefusedError, read_message, read_page
 from ghest_rt.messages.published import GhAngles
 from tests.client.fakes import message
 
@@ -20,18 +20,18 @@ def test_fields_that_were_added_are_passed_over() -> None:
 
 
 def test_a_later_schema_version_says_so_and_what_to_do() -> None:
-    with pytest.raises(UnreadableError, match=r"schema version 2.*knows 1.*update"):
+    with pytest.raises(RefusedError, match=r"schema version 2.*knows 1.*update"):
         read_message(GhAngles, document(schema_version=2))
 
 
 @pytest.mark.parametrize("payload", [b"", b"\xff", b"[]", b"{}", b'{"samples": 3}', b'{"samples": [{}]}'])
 def test_what_is_no_message_is_named(payload: bytes) -> None:
-    with pytest.raises(UnreadableError, match="GhAngles"):
+    with pytest.raises(RefusedError, match="GhAngles"):
         read_message(GhAngles, payload)
-    with pytest.raises(UnreadableError, match="missing samples"):
+    with pytest.raises(RefusedError, match="missing samples"):
         read_page(payload)
 
 
 def test_a_wrong_value_is_named_with_its_place() -> None:
-    with pytest.raises(UnreadableError, match="seq"):
+    with pytest.raises(RefusedError, match="seq"):
         read_message(GhAngles, document(seq="many"))

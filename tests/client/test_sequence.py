@@ -90,6 +90,17 @@ def test_an_answer_in_pages_is_asked_on_for() -> None:
     assert seqs(sequence.answer(request, [sample(seq) for seq in range(5, 9)], 100)) == list(range(1, 10))
 
 
+def test_an_answer_without_what_was_asked_for_ends_the_asking() -> None:
+    sequence = Sequence("one", WAIT_NS)
+    sequence.accept(sample(5), 0)
+    sequence.accept(sample(9), 0)
+    request = sequence.take_request()
+    assert request is not None
+    out = sequence.answer(request, [sample(1), sample(2)], 0)
+    assert out[0] == Gap("one", "a", 6, 8, GapCause.UNFILLED)
+    assert sequence.take_request() is None
+
+
 def test_with_filling_switched_off_a_gap_is_told_at_once() -> None:
     sequence = Sequence("one", None)
     sequence.accept(sample(1), 0)
