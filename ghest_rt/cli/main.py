@@ -319,7 +319,8 @@ def status(
     """Say how the running stations are; exit code 3 if there is none."""
     from ghest_rt.cli.status import show_status
 
-    show_status(tuple(connect or ["tcp/127.0.0.1:7447"]), station, identity, wait_s, watch, as_json)
+    endpoints = tuple(connect or ["tcp/127.0.0.1:7447"])
+    show_status(endpoints, station, identity=identity, wait_s=wait_s, watch=watch, as_json=as_json)
 
 
 @app.command()
@@ -375,17 +376,23 @@ def gateway(
     identity: Annotated[
         Path, typer.Option(metavar="FOLDER", help="Of a router or a station, made by certs issue", show_default=False)
     ],
-    listen: Annotated[list[str], typer.Option(metavar="ENDPOINT", help="For the network; may be repeated")] = [
-        "tls/0.0.0.0:7447"
-    ],  # noqa: B006
-    station: Annotated[list[str], typer.Option(metavar="ENDPOINT", help="A station of this machine; may be repeated")] = [
-        "tcp/127.0.0.1:7447"
-    ],  # noqa: B006
+    listen: Annotated[
+        list[str] | None,
+        typer.Option(metavar="ENDPOINT", help="For the network; may be repeated; default tls/0.0.0.0:7447", show_default=False),
+    ] = None,
+    station: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="ENDPOINT",
+            help="A station of this machine; may be repeated; default tcp/127.0.0.1:7447",
+            show_default=False,
+        ),
+    ] = None,
 ) -> None:
     """Let therapy software on other machines reach the stations of this one (needs the extra 'security')."""
     from ghest_rt.cli.gateway import run_gateway
 
-    run_gateway(identity, listen, station)
+    run_gateway(identity, listen or ["tls/0.0.0.0:7447"], station or ["tcp/127.0.0.1:7447"])
 
 
 @app.command("recording-key")

@@ -68,8 +68,12 @@ def load_access(path: Path) -> AccessList:
         ) from error
 
 
-def access_control(access: AccessList) -> dict[str, Any]:
+def access_control(access: AccessList, gateway: bool = False) -> dict[str, Any]:
     """Return Zenoh's `access_control` for a station or a router: what comes from whom is let in, and what goes out to whom.
+
+    Args:
+        access: Who may do what.
+        gateway: Whether the stations are connected to on this machine without TLS; nobody else has a link like that.
 
     A station behind a router sees the router's name only; so a router may pass on what an operator may, and tells therapy
     software and operators apart itself.
@@ -96,12 +100,17 @@ def access_control(access: AccessList) -> dict[str, Any]:
     publishing = ["publish", "take", "serve-calibration", "pass-calibration"]
     granted = {Role.THERAPY: reading, Role.OPERATOR: calibrating, Role.ROUTER: calibrating, Role.STATION: publishing}
     named = {role: access.of(role) for role in granted if access.of(role)}
+    subjects: list[dict[str, Any]] = [{"id": str(role), "cert_common_names": names} for role, names in named.items()]
+    policies = [{"subjects": [str(role)], "rules": granted[role]} for role in named]
+    if gateway:
+        subjects.append({"id": "local-station", "link_protocols": ["tcp"]})
+        policies.append({"subjects": ["local-station"], "rules": publishing})
     return {
         "enabled": True,
         "default_permission": "deny",
         "rules": rules,
-        "subjects": [{"id": str(role), "cert_common_names": names} for role, names in named.items()],
-        "policies": [{"subjects": [str(role)], "rules": granted[role]} for role in named],
+        "subjects": subjects,
+        "policies": policies,
     }
 
 

@@ -6,7 +6,7 @@ On this machine alone without further ado; beyond it only with an identity: mutu
 import json
 import re
 import socket
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
 import zenoh
@@ -14,6 +14,7 @@ import zenoh
 from ghest_rt.errors import BadInputError, GhestError
 from ghest_rt.security.access import ASKED_KEYS, access_control
 from ghest_rt.security.endpoints import split_endpoint, stays_here
+from ghest_rt.security.handshake import try_handshake
 from ghest_rt.security.identity import Identity
 from ghest_rt.security.roles import SERVER_ROLES
 
@@ -46,20 +47,56 @@ def open_session(
     """
     resolved = tuple(_with_port(endpoint) for endpoint in listen)
     settings = session_settings(resolved, connect, identity, mode)
+    try:
+        return _open(settings), resolved
+    except zenoh.ZError as error:
+        if identity is not None:
+            for endpoint in connect:
+                try_handshake(endpoint, identity)  # says more than Zenoh's time-out
+        raise _told(error, resolved, connect) from error
+
+
+def open_gateway(listen: Sequence[str], stations: Sequence[str], identity: Identity) -> tuple[zenoh.Session, tuple[str, ...]]:
+    """Open a router's session between the network and stations of this machine; return it as `open_session` does.
+
+    Args:
+        listen: Endpoints for the network, with TLS.
+        stations: Endpoints of stations on this machine, like "tcp/127.0.0.1:7447"; tried again until they are there.
+        identity: A router's or a station's.
+
+    Raises:
+        BadInputError: An endpoint of the network is without TLS, or one of a station is not on this machine.
+        GhestError: As `open_session`.
+    """
+    for endpoint in stations:
+        if split_endpoint(endpoint)[0] != "tcp" or not stays_here(endpoint):
+            raise BadInputError(f"{endpoint}: a gateway is connected to stations of its own machine: tcp/127.0.0.1:7447")
+    resolved = tuple(_with_port(endpoint) for endpoint in listen)
+    settings = session_settings(resolved, (), identity, "router")
+    settings |= {"connect/endpoints": list(stations), "transport/link/protocols": ["tls", "tcp"]}
+    if identity.access is not None:
+        settings["access_control"] = access_control(identity.access, gateway=True)
+    try:
+        return _open(settings), resolved
+    except zenoh.ZError as error:
+        raise _told(error, resolved, stations) from error
+
+
+def _open(settings: Mapping[str, Any]) -> zenoh.Session:
     config = zenoh.Config()
     for key, value in settings.items():
         config.insert_json5(key, json.dumps(value))
-    try:
-        return zenoh.open(config), resolved
-    except zenoh.ZError as error:
-        reason = _SOURCE_PLACE.sub("", str(error))
-        if "in use" in reason:
-            taken = ", ".join(resolved)
-            raise GhestError(
-                f"Zenoh cannot listen on {taken}: the port is taken, perhaps by another ghest-rt. "
-                "Stop the other program, or choose another port: --listen tcp/127.0.0.1:7448 (port 0 takes any free one)"
-            ) from error
-        raise GhestError(f"Zenoh cannot open a session (listen {list(resolved)}, connect {list(connect)}): {reason}") from error
+    return zenoh.open(config)
+
+
+def _told(error: zenoh.ZError, listen: Sequence[str], connect: Sequence[str]) -> GhestError:
+    reason = _SOURCE_PLACE.sub("", str(error))
+    if "in use" in reason:
+        return GhestError(
+            f"Zenoh cannot listen on {', '.join(listen)}: the port is taken, perhaps by another ghest-rt. "
+            "Stop the other program, or choose another port: --listen tcp/127.0.0.1:7448 (port 0 takes any free one)"
+        )
+    return GhestError(f"Zenoh cannot open a session (listen {list(listen)}, connect {list(connect)}): {reason}")
 
 
 def session_settings(

@@ -1,0 +1,148 @@
+"""Stations that listen on their own machine alone, reached through the gateway."""
+
+import contextlib
+import socket
+import subprocess
+import sys
+import threading
+import time
+
+import pytest
+import zenoh
+
+from ghest_rt.errors import BadInputError, GhestError
+from ghest_rt.security.endpoints import split_endpoint
+from ghest_rt.security.gateway import Gateway
+from ghest_rt.security.identity_check import load_identity
+from ghest_rt.security.session import open_session
+from tests.security.clinic import Clinic
+from tests.security.raw import open_raw
+
+KEY, LAST, CALIBRATE = "ghest/sim/gh/angles", "ghest/sim/last", "ghest/sim/calibrate/run"
+
+
+class Bench:
+    """A station on loopback and a gateway process before it."""
+
+    def __init__(self, clinic: Clinic) -> None:
+        self.session, (self.inside,) = open_session(("tcp/127.0.0.1:0",))
+        self.forged = threading.Event()
+        self.calibrated = threading.Event()
+        self._declared = [
+            self.session.declare_queryable(LAST, lambda query: query.reply(LAST, b'"last"')),
+            self.session.declare_queryable(CALIBRATE, self._calibrate),
+            self.session.declare_subscriber(
+                "ghest/**", lambda s: self.forged.set() if b"forged" in s.payload.to_bytes() else None
+            ),
+        ]
+        self.publisher = self.session.declare_publisher(KEY)
+        command = [sys.executable, "-m", "ghest_rt.cli.main", "gateway", "--identity", str(clinic.router)]
+        self.process = subprocess.Popen(
+            [*command, "--listen", "tls/127.0.0.1:0", "--station", self.inside], stdout=subprocess.PIPE, text=True
+        )
+        assert self.process.stdout is not None
+        self.outside = self.process.stdout.readline().split()[0]
+
+    def _calibrate(self, query: zenoh.Query) -> None:
+        self.calibrated.set()
+        query.reply(CALIBRATE, b'"done"')
+
+    def reads(self, session: zenoh.Session) -> bool:
+        """Whether a published sample reaches the session within two seconds."""
+        got = threading.Event()
+        with session.declare_subscriber("ghest/*/gh/angles", lambda _: got.set()):
+            for _ in range(100):
+                self.publisher.put(b"{}")
+                if got.wait(0.02):
+                    return True
+        return False
+
+    def close(self) -> None:
+        self.process.terminate()
+        self.process.communicate(timeout=20)
+        self.session.close()
+
+
+@pytest.fixture(scope="module")
+def bench(clinic: Clinic):
+    bench = Bench(clinic)
+    yield bench
+    bench.close()
+
+
+def answers(session: zenoh.Session, key: str) -> int:
+    return sum(reply.ok is not None for reply in session.get(key, timeout=1.0))
+
+
+def test_roles_hold_through_the_gateway(bench: Bench, clinic: Clinic) -> None:
+    therapy, _ = open_session((), (bench.outside,), load_identity(clinic.therapy), "client")
+    with therapy:
+        assert bench.reads(therapy)
+        assert answers(therapy, "ghest/*/last") == 1
+        assert answers(therapy, CALIBRATE) == answers(therapy, "ghest/**") == 0
+        therapy.put(KEY, b"forged")
+        therapy.put(CALIBRATE, b"forged")
+        assert not bench.calibrated.is_set()
+    operator, _ = open_session((), (bench.outside,), load_identity(clinic.operator), "client")
+    with operator:
+        assert bench.reads(operator)
+        assert answers(operator, CALIBRATE) == 1
+    assert not bench.forged.is_set()
+
+
+@pytest.mark.parametrize("who", ["revoked", "other_station"])
+def test_who_is_not_listed_for_it_gets_nothing(bench: Bench, clinic: Clinic, who: str) -> None:
+    session, _ = open_session((), (bench.outside,), load_identity(getattr(clinic, who)), "client")
+    with session:
+        assert not bench.reads(session)
+        assert answers(session, LAST) == 0
+
+
+def test_nobody_poses_as_the_local_station(bench: Bench) -> None:
+    """The gateway trusts its own connections without TLS, and takes none from others."""
+    _, host, port = split_endpoint(bench.outside)
+    with open_raw([f"tcp/{host}:{port}"]) as session:
+        assert not bench.reads(session)
+
+
+@pytest.mark.parametrize("who", ["foreign", "expired"])
+def test_a_refusal_is_told_in_words(bench: Bench, clinic: Clinic, who: str) -> None:
+    folder = getattr(clinic, who)
+    if who == "expired":
+        with pytest.raises(BadInputError, match="expired on"):
+            load_identity(folder)
+        return
+    (folder / "ca.pem").write_bytes((folder.parents[1] / "ca.pem").read_bytes())
+    with pytest.raises(GhestError, match="does not trust the station"):
+        open_session((), (bench.outside,), load_identity(folder), "client")
+
+
+def test_a_flood_of_handshakes_does_not_use_up_the_files(clinic: Clinic) -> None:
+    station, (inside,) = open_session(("tcp/127.0.0.1:0",))
+    stop = threading.Event()
+    most = 200
+    with station:
+        gateway = Gateway(("tls/127.0.0.1:0",), (inside,), load_identity(clinic.router), most_files=most)
+        thread = threading.Thread(target=gateway.run, args=(stop,))
+        thread.start()
+        _, host, port = split_endpoint(gateway.endpoints[0])
+        deadline_s = time.monotonic() + 20.0
+        while not gateway.reopened and time.monotonic() < deadline_s:
+            with contextlib.suppress(OSError), socket.create_connection((host, port)) as link:
+                link.sendall(bytes(100))
+        operator, _ = open_session((), (gateway.endpoints[0],), load_identity(clinic.operator), "client")
+        got = threading.Event()
+        with operator, operator.declare_subscriber("ghest/*/gh/angles", lambda _: got.set()):
+            while not got.wait(0.05) and time.monotonic() < deadline_s:
+                station.put(KEY, b"{}")
+        stop.set()
+        thread.join()
+        gateway.close()
+    assert gateway.reopened
+    assert got.is_set()
+
+
+@pytest.mark.parametrize("station", ["tcp/10.0.0.1:7447", "tls/127.0.0.1:7447"])
+def test_a_gateways_stations_are_on_its_machine(clinic: Clinic, station: str) -> None:
+    with pytest.raises(BadInputError, match="of its own machine"):
+        Gateway(("tls/127.0.0.1:0",), (station,), load_identity(clinic.router))
