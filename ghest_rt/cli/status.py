@@ -101,7 +101,7 @@ class StationWatch:
 
 
 def show_status(
-    endpoints: tuple[str, ...], station: str, identity: Path | None, wait_s: float, watch: bool, as_json: bool
+    endpoints: tuple[str, ...], station: str, *, identity: Path | None, wait_s: float, watch: bool, as_json: bool
 ) -> None:
     """Print how the stations are; once, or until a signal comes.
 
