@@ -103,7 +103,10 @@ CONTENDERS = {
             published_short="",
             published_deg=None,
             lag_ms=None,
-            caveat="everything behind the markers is this system's: the same cameras, calibration and estimator as `refined`",
+            caveat=(
+                "everything behind the markers is this system's: the same cameras, calibration and estimator as refined; without depth "
+                "the tilt of a marker seen from the front is weakly determined, worst at 128 x 128 pixels"
+            ),
             strength="the same optics; a marker with more edges",
         ),
         Contender(
@@ -139,7 +142,7 @@ CONTENDERS = {
             published_short="0.9",
             published_deg=0.889,
             lag_ms=None,
-            caveat="same calibration and optics as `fused`",
+            caveat="same calibration and optics as fused",
             strength="single frames without memory",
             ours=True,
         ),
