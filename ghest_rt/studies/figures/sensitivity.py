@@ -9,6 +9,8 @@ from ghest_rt.studies.paper_values import MEAN_RMSE_20_MM_DEG, PARAMETERS
 
 Row = dict[str, object]
 
+_S_LIMITS = (-1.0, 2.0)
+
 FIGURES = {"SAbAd": "14", "SFE": "15", "SIR": "16", "COMB": "17"}
 """The paper's figure of each movement."""
 
@@ -67,6 +69,7 @@ def draw_figure_14(rows: Sequence[Row], movement: str, method: str) -> Any:
             )
         if column.startswith("S_"):
             axes.axhline(1.0, color="0.4", linewidth=0.8, linestyle=":")
+            _keep_within(axes, _S_LIMITS)
         axes.set_title(title)
         axes.set_xlabel("translation of the marker (mm)")
         axes.set_ylabel(label)
@@ -74,6 +77,14 @@ def draw_figure_14(rows: Sequence[Row], movement: str, method: str) -> Any:
     figure.legend(handles, labels, loc="outside lower center", ncols=3, frameon=False)
     figure.suptitle(f"{movement}, method {method}", fontsize=10)
     return figure
+
+
+def _keep_within(axes: Any, limits: tuple[float, float]) -> None:
+    """Cut the axis where single values would flatten all others, and say so."""
+    low, high = axes.get_ylim()
+    axes.set_ylim(max(low, limits[0]), min(high, limits[1]))
+    if low < limits[0] or high > limits[1]:
+        axes.text(0.98, 0.03, "some points lie beyond the axis", transform=axes.transAxes, ha="right", fontsize=7)
 
 
 def draw_drift_by_method(rows: Sequence[Row]) -> Any:
@@ -100,7 +111,7 @@ def draw_drift_by_method(rows: Sequence[Row]) -> Any:
             known = [values for values in groups if values]
             color = METHOD_COLORS[method]
             axes.fill_between(x, [min(v) for v in known], [max(v) for v in known], color=color, alpha=0.15, linewidth=0)
-            axes.plot(x, [sum(v) / len(v) for v in known], color=color, marker="o", markersize=3, label=method)
+            axes.plot(x, [sum(v) / len(v) for v in known], color=color, marker="o", markersize=3, label=f"method {method}")
         axes.set_title(title.partition(") ")[2])
         axes.set_xlabel("translation of the marker (mm)")
         axes.set_ylabel(label)
@@ -147,7 +158,7 @@ def draw_further(rows: Sequence[Row]) -> Any:
                 ]
                 means.append(sum(values) / len(values) if values else float("nan"))
             places = [k + (index - (len(methods) - 1) / 2) * height for k in range(len(means))]
-            axes.barh(places, means, 0.9 * height, color=METHOD_COLORS[method], label=method)
+            axes.barh(places, means, 0.9 * height, color=METHOD_COLORS[method], label=f"method {method}")
         axes.set_yticks(range(len(names[group])), [name.removeprefix(f"{group} ") for name in names[group]])
         axes.invert_yaxis()
         axes.grid(axis="y", visible=False)
