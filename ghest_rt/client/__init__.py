@@ -30,7 +30,6 @@ __all__ = [
     "LinkChanged",
     "LinkState",
     "Refused",
-    "Refused",
     "Restarted",
     "Sample",
     "Update",
