@@ -1,8 +1,9 @@
 """`study latency`: how far published angles are behind the arm, by how fast it moves."""
 
 import math
+import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Literal, cast
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy as np
 from ghest_rt.geometry.so3 import Array
 from ghest_rt.studies.engine.run import Executor, Progress, run_tasks
 from ghest_rt.studies.engine.store import ResultStore
+from ghest_rt.studies.latency_computing import Clock, measure_computing
 from ghest_rt.studies.latency_tasks import CANDIDATES, latency_task
 from ghest_rt.studies.movements import METHODS, Movements
 
@@ -23,6 +25,8 @@ TITLES = {
     "fused": "fused",
 }
 _LEAST_IN_BIN = 10
+_COMPUTING_S = 0.6
+_COMPUTING_FRAMES = 25
 
 Row = dict[str, object]
 
@@ -51,7 +55,11 @@ _SPAN_S = 8.0
 
 
 def latency(
-    settings: LatencySettings, store: ResultStore, executor: Executor, progress: Progress | None = None
+    settings: LatencySettings,
+    store: ResultStore,
+    executor: Executor,
+    progress: Progress | None = None,
+    clock: Clock = time.perf_counter_ns,
 ) -> dict[str, object]:
     """Run the study; return its summary, as JSON takes it.
 
@@ -60,7 +68,8 @@ def latency(
     Returns:
         `settings`; `rows`, one per movement, speed and candidate: RMS error when published and at its own instant, RMS speed of
         the GH joint; `bins`, the published error by angular speed over everything played; `candidates`: lag, ages of the
-        inputs, `effective_delay_ms`, the slope of error against speed.
+        inputs, `effective_delay_ms`, the slope of error against speed, and `vision_ms` and `answer_ms`, how long this machine
+        takes to find a marker and to answer.
 
     Raises:
         BadInputError: A movement cannot be used.
@@ -78,6 +87,8 @@ def latency(
         for key in CANDIDATES
     ]
     pooled = {key: _pooled([result[key] for result in found]) for key in CANDIDATES}
+    clinic = scenarios[0].undisturbed().model_copy(update={"duration_s": _COMPUTING_S}).world()
+    computing = {key: measure_computing(clinic, method, _COMPUTING_FRAMES, clock) for key, (method, _) in CANDIDATES.items()}
     return {
         "study": "latency",
         "settings": {
@@ -97,6 +108,7 @@ def latency(
                 "age_ms": found[0][key]["age_ms"],
                 "effective_delay_ms": effective_delay_ms(*pooled[key]),
                 "published_deg": _rms(pooled[key][1]),
+                **asdict(computing[key]),
             }
             for key in CANDIDATES
         ],

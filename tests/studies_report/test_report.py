@@ -78,6 +78,10 @@ def test_the_papers_values_stand_beside_ours(page: str) -> None:
     assert "SFE 3.9, SAA 3.3, SIER 6.5" in texts
 
 
+def test_computing_times_come_from_the_clock(page: str) -> None:
+    assert Page(page).texts.count("1.00, 1.00") == 4  # a clock that goes on by 1 ms whenever it is read
+
+
 def test_what_does_not_hold_is_said(page: str) -> None:
     assert "does not" in Page(page).texts
     assert "COMB is <worst>" in Page(page).texts

@@ -69,11 +69,18 @@ def _print(summary: dict[str, Any], folder: Path) -> None:
     candidates = summary["candidates"]
     table = Table(title="Answers when they are published", title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
     table.add_column("method", no_wrap=True)
-    for column in ("lag\nms", "image\nms old", "behind\nms", "error\n° RMS"):
+    for column in ("lag\nms", "image\nms old", "computing\nms", "behind\nms", "error\n° RMS"):
         table.add_column(column, justify="right", no_wrap=True)
     for who in candidates:
         age_ms = max(who["age_ms"][camera] or 0.0 for camera in ("r0", "r1"))
-        figures = (f"{who['lag_ms']:.0f}", f"{age_ms:.1f}", f"{who['effective_delay_ms']:.1f}", f"{who['published_deg']:.3f}")
+        computing_ms = who["vision_ms"] + who["answer_ms"]
+        figures = (
+            f"{who['lag_ms']:.0f}",
+            f"{age_ms:.1f}",
+            f"{computing_ms:.1f}",
+            f"{who['effective_delay_ms']:.1f}",
+            f"{who['published_deg']:.3f}",
+        )
         table.add_row(who["title"], *figures)
     console.print(table)
     table = Table(title="Degrees RMS when published", title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)

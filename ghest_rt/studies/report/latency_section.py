@@ -32,12 +32,21 @@ def latency_section(summary: Row, folder: Path) -> Section:
 def _candidates(summary: Row) -> Table:
     return Table(
         title="Answers when they are published",
-        head=("method", "lag (ms)", "newest image used (ms old)", "behind the arm (ms)", "error (° RMS)"),
+        note="Computing: median on the machine that ran the study; it adds to the age of the image.",
+        head=(
+            "method",
+            "lag (ms)",
+            "newest image used (ms old)",
+            "computing: image, answer (ms)",
+            "behind the arm (ms)",
+            "error (° RMS)",
+        ),
         rows=tuple(
             (
                 Cell(who["title"], ""),
                 Cell(f"{who['lag_ms']:.0f}"),
                 Cell(number(max(who["age_ms"][camera] or 0.0 for camera in ("r0", "r1")))),
+                Cell(f"{number(who['vision_ms'])}, {number(who['answer_ms'])}"),
                 Cell(number(who["effective_delay_ms"]), _kind(who["key"])),
                 Cell(number(who["published_deg"]), _kind(who["key"])),
             )

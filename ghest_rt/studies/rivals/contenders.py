@@ -104,8 +104,8 @@ CONTENDERS = {
             published_deg=None,
             lag_ms=None,
             caveat=(
-                "everything behind the markers is this system's: the same cameras, calibration and estimator as refined; without depth "
-                "the tilt of a marker seen from the front is weakly determined, worst at 128 x 128 pixels"
+                "everything behind the markers is this system's: the same cameras, calibration and estimator as refined; "
+                "without depth the tilt of a marker seen from the front is weakly determined, worst at 128 x 128 pixels"
             ),
             strength="the same optics; a marker with more edges",
         ),
