@@ -31,7 +31,7 @@ def test_help_imports_nothing_heavy(ghest_rt: Run) -> None:
 
 
 def test_replay_json_is_one_document_on_standard_output(ghest_rt: Run, blank: Path) -> None:
-    done = ghest_rt("--replay", blank, "--json", "--no-publish")
+    done = ghest_rt("--replay", blank, "--json", "--no-publish", "--method", "refined")
     assert done.returncode == 0, done.stderr
     (run,) = json.loads(done.stdout)["runs"]
     assert run["source"] == "blank.mcap"

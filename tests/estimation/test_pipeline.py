@@ -48,7 +48,7 @@ def events(clinic: Any, period_ms: int = 33, count: int = 20) -> list[Any]:
 
 
 def test_frames_and_encoders_become_estimates(make_clinic: Callable[..., Any]) -> None:
-    clinic = make_clinic(2)
+    clinic = make_clinic(2, method="refined")
     oracle = Oracle(clinic)
     pipeline = Pipeline(clinic.station, INFOS, JOINTS, detectors={"r0": oracle, "r1": oracle})
     assert (pipeline.method, pipeline.rate_hz, pipeline.lag_ns) == ("refined", 66.6, 45 * MS)

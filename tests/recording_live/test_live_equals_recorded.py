@@ -61,7 +61,7 @@ async def test_what_was_published_can_be_estimated_from_the_recording(source: Re
         ),
         cameras={name: RecordedCamera(player.camera(name), recorder) for name in source.camera_infos},
         encoders=RecordedEncoders(player.encoders(), recorder),
-        make_pipeline=lambda infos, joints: Pipeline(station, infos, joints),
+        make_pipeline=lambda infos, joints: Pipeline(station, infos, joints, "refined"),
         composer=AnglesComposer(config.station.arm, "refined", config.calibration.id, 0, Numbering()),
         outputs=(out, output),
         clock=clock,
@@ -75,7 +75,7 @@ async def test_what_was_published_can_be_estimated_from_the_recording(source: Re
     recordings = open_recordings(tmp_path)
     first = recordings[0]
     assert first.grid_t_0_ns == service.anchor_ns
-    pipeline = Pipeline(first.station, first.camera_infos, first.encoder_joints)
+    pipeline = Pipeline(first.station, first.camera_infos, first.encoder_joints, "refined")
     events = (event for recording in recordings for event in recording.events())
     composer = AnglesComposer(config.station.arm, "refined", config.calibration.id, 0, Numbering())
     offline = {
