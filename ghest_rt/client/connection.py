@@ -78,6 +78,7 @@ class Connection:
         self._identity = identity
         self._deliver = deliver
         self._stop = threading.Event()
+        self._ready = threading.Event()
         self._session: zenoh.Session | None = None
         self._thread = threading.Thread(target=self._open, name=f"ghest-client {endpoint}", daemon=True)
 
@@ -112,8 +113,8 @@ class Connection:
         self._get(f"ghest/{request.station}/gh/recent?{parameters}", take)
 
     def ask(self, station: str, what: str, timeout_s: float) -> bytes | None:
-        """Ask a station for one of its documents and wait; None without an answer."""
-        if self._session is None:
+        """Ask a station for one of its documents and wait, also for the connection; None without an answer."""
+        if not self._ready.wait(timeout_s) or self._session is None:
             return None
         for reply in self._session.get(f"ghest/{station}/{what}", timeout=timeout_s):
             if reply.ok is not None:
@@ -140,6 +141,7 @@ class Connection:
                     self._deliver(Arrival(Kind.DISCONNECTED, self._endpoint, payload=told.encode()))
                 self._stop.wait(_RETRY_S)
             else:
+                self._ready.set()
                 return
 
     def _subscribe(self, session: zenoh.Session) -> None:

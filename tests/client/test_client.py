@@ -10,6 +10,7 @@ from ghest_rt.client import (
     ConnectionChanged,
     EventReport,
     GhestClient,
+    Limits,
     LinkCause,
     LinkState,
     Refused,
@@ -166,7 +167,7 @@ def test_several_stations_at_one_place_and_at_several_are_told_apart() -> None:
 
 
 def test_only_the_stations_named_are_heard() -> None:
-    with FakeStation("two") as two, GhestClient(two.endpoint, stations="one") as client:
+    with FakeStation("two") as two, GhestClient(two.endpoint, stations="one", limits=Limits(lost_after_s=0.4)) as client:
         told = Told(client.updates())
         told.wait(lambda: any(isinstance(update, ConnectionChanged) for update in told.all))
         two.publish(30, period_s=0.005)
@@ -198,6 +199,11 @@ def test_events_come_and_documents_can_be_asked_for() -> None:
         assert isinstance(calibration, dict) and "m0_from_gh" in calibration
         with pytest.raises(GhestError, match="nobody"):
             client.ask("nobody", "calibration", timeout_s=0.2)
+
+
+def test_a_question_waits_for_the_connection() -> None:
+    with FakeStation() as station, GhestClient(station.endpoint) as client:
+        assert isinstance(client.ask("one", "schema"), dict)
 
 
 def test_a_message_that_cannot_be_read_is_told_once() -> None:
