@@ -24,6 +24,7 @@ _MAX_PLANE_OFF = 0.03  # change of theta, relative, that the fit may ask of the 
 _TIGHT = 8.0  # squared deviations per degree of freedom above which something may be wrong
 _EXPECTED = 3.0  # squared deviations per degree of freedom that noise explains
 _CLEARLY = 6.0  # how much better a fit must be for a disk to be left out
+_LEAST_DROP_PX = 0.1  # and how far off a centre must be
 _SAME_POSE_RAD = 0.06
 _TELL_APART_CHI2 = 16.0
 _RANGE_M = (0.03, 2.0)
@@ -87,7 +88,8 @@ class Solver:
     ) -> Solution:
         """Judge a fit with depth; leave out the disk or the plane that contradicts the rest."""
         disks = used = len(centers.sigma)
-        if fit is not None and disks == 4 and fit.chi2 > _TIGHT * _freedom(disks):
+        far = fit is not None and float(fit.deviations.max()) > _LEAST_DROP_PX / self._optics.mean_focal_px
+        if fit is not None and far and disks == 4 and fit.chi2 > _TIGHT * _freedom(disks):
             dropped = self._without_one(centers, plane, fit)
             if dropped is not None and dropped.chi2 / _freedom(3) < fit.chi2 / _freedom(4) / _CLEARLY:
                 fit, used = dropped, 3

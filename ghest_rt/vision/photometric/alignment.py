@@ -33,6 +33,7 @@ _MOST_UNEVEN_PX = 0.2
 _UNEVEN_FREEDOM = 5.0  # what eight shifts and a plane say beyond the pose
 _DOUBTFUL = 2.0  # by which factor squared shifts must be larger than thought for another step
 _SIGMAS = 3.5
+_GATE = 16.0  # of 255: no pixel is an outlier for being this near
 _LEAST_NOISE = 1.2  # of 255: rounding, and what the profile does not know
 _MAX_NOISE = 30.0
 _LEAST_PIXELS = 60
@@ -154,7 +155,7 @@ def _blocks(pixels: EdgePixels, edges: Edges, blur_px: float, bends: Array) -> A
     covered *= pixels.contrast
     np.subtract(pixels.excess, covered, out=residual)
     noise2 = _noise2(residual)
-    used = np.abs(residual) < _SIGMAS * math.sqrt(noise2)
+    used = np.abs(residual) < max(_SIGMAS * math.sqrt(noise2), _GATE)
     count = int(np.count_nonzero(used))
     if noise2 > _MAX_NOISE**2 or count < _LEAST_PIXELS:
         return None
