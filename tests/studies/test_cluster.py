@@ -9,17 +9,24 @@ from typing import Any
 import pytest
 
 from ghest_rt.studies.engine.cluster import ClusterExecutor
+from ghest_rt.studies.engine.local import LocalExecutor
 from ghest_rt.studies.engine.run import run_tasks
 from ghest_rt.studies.engine.store import ResultStore
+from ghest_rt.studies.session.scenario import Scenario
+from ghest_rt.studies.session.tasks import judge_task, observe_task
 from tests.studies.study_tasks import square_task
 
 distributed = pytest.importorskip("distributed")
 
 
-@pytest.fixture
-def cluster(tmp_path: Path) -> Iterator[Any]:
+@pytest.fixture(scope="module")
+def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
     with distributed.LocalCluster(
-        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=":0", local_directory=str(tmp_path / "dask")
+        n_workers=2,
+        threads_per_worker=1,
+        processes=True,
+        dashboard_address=":0",
+        local_directory=str(tmp_path_factory.mktemp("dask")),
     ) as found:
         yield found
 
@@ -43,3 +50,11 @@ def test_a_worker_killed_half_way_loses_no_result(cluster: Any, tmp_path: Path) 
     found = run_tasks(tasks, store, ClusterExecutor(cluster.scheduler_address), kill_one)
     assert killed
     assert [value["found"] for value in found] == [n**2 + 100 for n in range(24)]
+
+
+def test_a_session_judged_on_the_cluster_is_the_one_judged_here(cluster: Any, tmp_path: Path) -> None:
+    base = Scenario(movement="SIR", duration_s=0.2, methods=("paper", "refined"))
+    task = judge_task(base.model_copy(update={"shifts": ("m1:x:0.01",)}), 13, observe_task(base, 13))
+    there = run_tasks([task], ResultStore(tmp_path / "there"), ClusterExecutor(cluster.scheduler_address))
+    here = run_tasks([task], ResultStore(tmp_path / "here"), LocalExecutor(1))
+    assert there == here

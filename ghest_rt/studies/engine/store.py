@@ -43,7 +43,7 @@ class ResultStore:
             self.folder.mkdir(parents=True, exist_ok=True)
             if result.arrays:
                 part = self.folder / f".{key}.{os.getpid()}.npz"
-                np.savez(part, **result.arrays)  # type: ignore[arg-type]
+                np.savez(part, allow_pickle=False, **result.arrays)
                 part.replace(self._npz(key))
             part = self.folder / f".{key}.{os.getpid()}.json"
             part.write_text(json.dumps({"cpu_s": cpu_s, "values": result.values}), encoding="utf-8")

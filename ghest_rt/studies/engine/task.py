@@ -6,6 +6,7 @@ import json
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 from numpy.typing import NDArray
 
@@ -22,7 +23,7 @@ class Result:
     """
 
     values: dict[str, object]
-    arrays: dict[str, NDArray[object]] = field(default_factory=dict)  # type: ignore[type-var]
+    arrays: dict[str, NDArray[Any]] = field(default_factory=dict)
 
 
 Handler = Callable[[dict[str, object], Sequence[Result]], Result]
