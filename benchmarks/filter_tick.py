@@ -1,4 +1,4 @@
-"""The estimators' share of a tick, vision left out: encoder row, a sighting of each marker, estimate; on one core."""
+"""The estimators' share of a tick, vision left out: encoder row, a sighting of each marker, estimate; CPU time of one core."""
 
 import time
 from pathlib import Path
@@ -30,12 +30,12 @@ def run(quick: bool) -> dict[str, Any]:
 
 def _ticks(session: Session, method: str) -> list[float]:
     seconds: list[float] = []
-    last = time.perf_counter()
+    last = time.thread_time()
 
     def tick() -> None:
         nonlocal last
-        seconds.append(time.perf_counter() - last)
-        last = time.perf_counter()
+        seconds.append(time.thread_time() - last)
+        last = time.thread_time()
 
     estimates(session, estimator_for(session, method), lag_ns_of(session.station.config, method), tick)
     return seconds[_WARM_UP:]

@@ -90,6 +90,14 @@ class ArmChain:
             return still
         return eq6_e_from_camera(self._fk.link_pose(self._link[camera], joint_positions), self._link_from_camera[camera])
 
+    def forearm_in_e(self, joint_positions: Array) -> Array | None:
+        """Return the (3,) direction of the forearm in E, elbow to wrist; None where it is not on the exoskeleton.
+
+        Args:
+            joint_positions: (n,) rad (m for prismatic joints).
+        """
+        return None if self._elbow is None else self._elbow.forearm_in_e(joint_positions)
+
     def marker_in_e(self, observation: MarkerObservation, joints: JointState | None) -> PoseSample | None:
         """Return a marker's pose in E, equations (6) and (7).
 

@@ -41,6 +41,14 @@ class ElbowGeometry:
         self._side = 1.0 if arm == "right" else -1.0
         self._pronation = None if elbow.pronation_joint is None else list(encoder_joints).index(elbow.pronation_joint)
 
+    def forearm_in_e(self, joint_positions: Array) -> Array:
+        """Return the forearm's direction, elbow to wrist: (3,) unit vector, E axes.
+
+        Args:
+            joint_positions: (n,) rad (m for prismatic joints).
+        """
+        return np.asarray(self._fk.link_pose(self._link, joint_positions)[:3, :3] @ self._axis)
+
     def angles(self, e_from_arm: Array, joint_positions: Array, covariance: Array | None) -> ElbowAngles | None:
         """Return the elbow's angles.
 
@@ -53,7 +61,7 @@ class ElbowGeometry:
             None if the forearm seems to lie along the elbow's flexion axis.
         """
         R = e_from_arm[:3, :3]
-        fx, fy, fz = (float(v) for v in R.T @ (self._fk.link_pose(self._link, joint_positions)[:3, :3] @ self._axis))
+        fx, fy, fz = (float(v) for v in R.T @ self.forearm_in_e(joint_positions))
         cosine = math.hypot(fy, fz)
         if cosine < _LEAST_COSINE:
             return None

@@ -76,6 +76,8 @@ class Belief:
         agility: Factor on the process noise of m0 with the GH centre, and of m1.
         seen_ns: Capture time of the last measurement accepted of m0 and m1.
         surprise: Of m0 and m1: (3,) the last innovation of the rotation, whitened.
+        strain: Of m0 and m1: (3,) the last innovation of the GH centre's place, whitened.
+        slack: Factor on the creep of the GH centre in the markers.
         streaks: Outliers in a row of m0 and m1.
         base: How m0 and m1 sit on their bones, jumps included.
     """
@@ -91,6 +93,8 @@ class Belief:
     seen_ns: tuple[int, int]
     speed_rad_s: float = 0.0
     surprise: tuple[Array, Array] = field(default_factory=lambda: (np.zeros(3), np.zeros(3)))
+    strain: tuple[Array, Array] = field(default_factory=lambda: (np.zeros(3), np.zeros(3)))
+    slack: float = 1.0
     streaks: tuple[Streak, Streak] = field(default_factory=lambda: (Streak(), Streak()))
     base: tuple[Base, Base] = field(default_factory=lambda: (Base(), Base()))
 
@@ -108,6 +112,8 @@ class Belief:
             self.seen_ns,
             self.speed_rad_s,
             self.surprise,
+            self.strain,
+            self.slack,
             self.streaks,
             self.base,
         )

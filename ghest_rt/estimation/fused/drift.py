@@ -1,11 +1,11 @@
-"""Has a marker moved on its bone? Sixteen answers weighed against each other; section 6 of docs/fused-estimator.md."""
+"""Has a marker moved on its bone? Thirty-six answers weighed against each other; section 6 of docs/fused-estimator.md."""
 
 import itertools
 from dataclasses import dataclass
 
 import numpy as np
 
-from ghest_rt.estimation.fused.belief import ACROMION, ARM, BOTH_GH, GH, POSES, Base, Belief
+from ghest_rt.estimation.fused.belief import ACROMION, ARM, GH, POSES, Base, Belief
 from ghest_rt.estimation.fused.tuning import Tuning
 from ghest_rt.geometry.so3 import Array, exp_so3, log_so3, skew
 
@@ -16,12 +16,22 @@ LENGTH = 12
 DRIFT_SIZE = 13
 # What a posture consists of: scapula, GH centre, humerus, drift.
 _POSTURE = 9
-# Of the belief's error states, those that a posture depends on: poses, and the GH centre in the markers.
-_KNOWN = 15
+# What a posture depends on: of the belief's error states the poses, and the GH centre in the markers; and the elbow's place.
+_KNOWN = 18
+_FOUND = slice(9, 18)
+# What m1 did: it is so from the beginning of the session, or since then.
+_EVER, _SINCE = 1, 2
+# Evidence (twice a logarithm) that counts as clear when an answer is held against what was seen earlier.
+_CLEAR = 10.0
+# Keeps the elbow's rows regular in answers that say nothing about it, m^2.
+_REGULAR = np.diag(np.repeat((0.0, 1e-14), (6, 3)))
+# Variance of an elbow's place that is not known, m^2.
+_ANYWHERE_M2 = 1e2
+_ELBOW = slice(15 * (_KNOWN + 1), None, _KNOWN + 1)
 # An answer this unlikely is left out.
 _NEGLIGIBLE = 2e-2
 # The answers are weighed this often.
-_WEIGH_NS = 60_000_000
+_WEIGH_NS = 100_000_000
 # The arm length is taken anew into the geometry when it has changed by this much.
 _LENGTH_STEP_M = 0.004
 
@@ -63,7 +73,12 @@ class DriftJudge:
         self._m0_from_gh = m0_from_gh
         self._m1_from_elw = m1_from_elw
         self._arm_length_m = arm_length_m
-        self._moved = np.array(list(itertools.product((False, True), repeat=4)))
+        # Slide and turn of m0; of m1: none, from the beginning, or since.
+        kinds = np.array(list(itertools.product((0, 1), (0, 1), (0, 1, 2), (0, 1, 2))))
+        self._moved = kinds > 0
+        self._since = kinds == _SINCE
+        self._ever = (kinds[:, 2:] == _EVER).any(axis=1)
+        self._came = self._since.any(axis=1)
         self._cost = self._moved @ np.array([tuning.slide_cost, tuning.turn_cost] * 2)
         length = tuning.unknown_arm_length_m if arm_length_m is None else tuning.arm_length_m
         slides = [np.array(tuning.slide_m) ** 2, np.full(2, tuning.calibrated_m**2), np.full(2, tuning.exact_m**2)]
@@ -72,21 +87,36 @@ class DriftJudge:
             np.concatenate((np.repeat(np.column_stack((s, t)).ravel(), 3), (length**2,)))
             for s, t in zip(slides, turns, strict=True)
         )
-        spread = np.concatenate((np.repeat(self._moved, 3, axis=1), np.ones((16, 1), dtype=bool)), axis=1)
+        spread = np.concatenate((np.repeat(self._moved, 3, axis=1), np.ones((len(kinds), 1), dtype=bool)), axis=1)
         self._test = np.where(spread, moved, tolerance)
         self._prior = np.where(spread, moved, exact)
+        self._elbow_m2 = tuning.elbow_m**2
         self._explained: _Explained | None = None
         self._weighed: _Explained | None = None
         self._weighed_ns = 0
-        self._weights = np.zeros(16)
+        self._weights = np.zeros(len(kinds))
+        self._against = np.zeros(len(kinds))
 
-    def judge(self, belief: Belief) -> Posture:
-        """Return the bones as the mean over the answers, with the covariance of the mixture."""
+    def judge(self, belief: Belief, elbow_moved: Array | None = None) -> Posture:
+        """Return the bones as the mean over the answers, with the covariance of the mixture.
+
+        Args:
+            belief: The belief.
+            elbow_moved: (3,) how far the elbow, as m1 shows it, has moved in camera r1 since the beginning; axes of m1 as
+                calibrated, m. None if that is not known.
+        """
         explained = self._explanations(belief)
-        found = np.concatenate(belief.gh_in_marker) - explained.expected
-        weights = self._weigh(belief, explained, found)
+        found = np.zeros(9)
+        found[:3], found[3:6] = belief.gh_in_marker
+        found[:6] -= explained.expected
+        P = np.zeros((_KNOWN, _KNOWN))
+        P[:15, :15] = belief.P[:15, :15]
+        P.ravel()[_ELBOW] = _ANYWHERE_M2 if elbow_moved is None else self._elbow_m2
+        if elbow_moved is not None:
+            found[6:] = elbow_moved
+        weights = self._weigh(belief.t_ns, P[_FOUND, _FOUND], explained, found, elbow_known=elbow_moved is not None)
         kept = np.flatnonzero(weights)
-        means, covariances = zip(*(self._posture(belief, explained, int(h), found) for h in kept), strict=True)
+        means, covariances = zip(*(self._posture(belief, P, explained, int(h), found) for h in kept), strict=True)
         if len(kept) == 1:
             return self._compose(belief, explained, means[0], covariances[0], self._drifted(weights))
         mean = np.sum([weights[h] * m for h, m in zip(kept, means, strict=True)], axis=0)
@@ -100,17 +130,25 @@ class DriftJudge:
         m0, m1 = (float(weights[self._moved[:, k] | self._moved[:, k + 1]].sum()) for k in (0, 2))
         return m0, m1
 
-    def _weigh(self, belief: Belief, explained: "_Explained", found: Array) -> Array:
-        """Return the (16,) probabilities of the answers; drift is slow, they are asked for anew only now and then."""
-        if self._weighed is explained and 0 <= belief.t_ns - self._weighed_ns < _WEIGH_NS:
+    def _weigh(self, t_ns: int, P: Array, explained: "_Explained", found: Array, *, elbow_known: bool) -> Array:
+        """Return the (36,) probabilities of the answers; drift is slow, they are asked for anew only now and then."""
+        if self._weighed is explained and 0 <= t_ns - self._weighed_ns < _WEIGH_NS:
             return self._weights
-        S = belief.P[BOTH_GH, BOTH_GH] + explained.test
-        distance = np.linalg.solve(S, np.broadcast_to(found[:, None], (16, 6, 1)))[:, :, 0] @ found
-        cost = distance + np.linalg.slogdet(S)[1] + self._cost
+        S = P + explained.test
+        distance = np.linalg.solve(S, np.broadcast_to(found[:, None], (len(S), 9, 1)))[:, :, 0] @ found
+        evidence = distance + np.linalg.slogdet(S)[1]
+        # What has been there from the beginning cannot have been missing before, nor what has come since have been there.
+        if elbow_known:
+            self._against[self._ever] = np.maximum(self._against, evidence - evidence[0] - _CLEAR)[self._ever]
+        else:
+            self._against[self._came] = max(float(evidence[0] - evidence.min()) - _CLEAR, 0.0)
+        cost = evidence + self._cost + self._against
+        if not elbow_known:
+            cost[self._came] = np.inf
         odds = np.exp(-0.5 * (cost - cost.min()))
         odds[odds < _NEGLIGIBLE] = 0.0
         self._weights = odds / odds.sum()
-        self._weighed, self._weighed_ns = explained, belief.t_ns
+        self._weighed, self._weighed_ns = explained, t_ns
         return self._weights
 
     def _explanations(self, belief: Belief) -> "_Explained":
@@ -129,7 +167,7 @@ class DriftJudge:
     def _explain(self, belief: Belief, length_m: float) -> "_Explained":
         along = self._m1_from_elw[:3, 1]
         nominal = (self._m0_from_gh[:3, 3], self._m1_from_elw[:3, 3] + length_m * along)
-        G = np.zeros((6, DRIFT_SIZE))
+        G = np.zeros((9, DRIFT_SIZE))
         expected = np.empty(6)
         variance = np.zeros(DRIFT_SIZE)
         for k, base in enumerate(belief.base):
@@ -139,19 +177,25 @@ class DriftJudge:
             G[rows, SLIDE[k]] = -base.turn.T
             G[rows, TURN[k]] = skew(there)
             variance[SLIDE[k]], variance[TURN[k]] = base.slide_variance, base.turn_variance
-        G[3:, LENGTH] = belief.base[1].turn.T @ along
+        G[3:6, LENGTH] = belief.base[1].turn.T @ along
+        # The elbow as m1 shows it: displaced with the marker, and turned about its centre, if that happened since.
+        all_G = np.repeat(G[None], len(self._moved), axis=0)
+        all_G[:, 6:, SLIDE[1]] = self._since[:, 2, None, None] * np.eye(3)
+        all_G[:, 6:, TURN[1]] = self._since[:, 3, None, None] * -skew(self._m1_from_elw[:3, 3])
         test, prior = self._test + variance, self._prior + variance
-        spread = np.einsum("ij,hj,kj->hik", G, prior, G)
-        W = np.swapaxes(np.linalg.solve(spread, G * prior[:, None, :]), 1, 2)
-        rest = np.einsum("hj,jk->hjk", prior, np.eye(DRIFT_SIZE)) - W @ (G * prior[:, None, :])
-        return _Explained(belief.base, length_m, expected, np.einsum("ij,hj,kj->hik", G, test, G), spread, W, rest)
+        weighted = all_G * prior[:, None, :]
+        spread = weighted @ np.swapaxes(all_G, 1, 2) + _REGULAR
+        W = np.swapaxes(np.linalg.solve(spread, weighted), 1, 2)
+        rest = np.einsum("hj,jk->hjk", prior, np.eye(DRIFT_SIZE)) - W @ weighted
+        tested = (all_G * test[:, None, :]) @ np.swapaxes(all_G, 1, 2)
+        return _Explained(belief.base, length_m, expected, tested, spread, W, rest)
 
-    def _posture(self, belief: Belief, explained: "_Explained", h: int, found: Array) -> tuple[Array, Array]:
+    def _posture(self, belief: Belief, P: Array, explained: "_Explained", h: int, found: Array) -> tuple[Array, Array]:
         """Return the (22,) shift and (22, 22) covariance of the posture if answer `h` is the right one."""
-        columns = belief.P[:_KNOWN, BOTH_GH]
+        columns = P[:, _FOUND]
         gain = np.linalg.solve(columns[9:] + explained.spread[h], columns.T).T
         shift = -(gain @ found)
-        P = belief.P[:_KNOWN, :_KNOWN] - gain @ columns.T
+        P = P - gain @ columns.T
         W = explained.W[h]
         m0, m1 = belief.e_from_marker
         # Errors of the posture from those of the poses and of the GH centre in the markers, and from what W leaves open.
@@ -193,10 +237,10 @@ class _Explained:
         base: The jumps it was made for.
         length_m: The arm length it was made for.
         expected: (6,) GH centre in m0 and in m1 if nothing has drifted.
-        test: (16, 6, 6) how far from there it may be found, for weighing the answers.
-        spread: (16, 6, 6) the same for making use of them.
-        W: (16, 13, 6) drift from the GH centre's deviation.
-        rest: (16, 13, 13) covariance of the drift that this leaves.
+        test: (36, 9, 9) how far from there it may be found, for weighing the answers.
+        spread: (36, 9, 9) the same for making use of them.
+        W: (36, 13, 9) drift from the deviation of the GH centre and the elbow.
+        rest: (36, 13, 13) covariance of the drift that this leaves.
     """
 
     base: object

@@ -8,11 +8,13 @@ import numpy as np
 from ghest_drivers.samples import EncoderSample
 from ghest_rt.estimation.arm import eq10_m0_from_arm, gh_from_arm_rotation, step3_4_5_e_from_arm
 from ghest_rt.estimation.arm_chain import CAMERAS, ArmChain, lost
-from ghest_rt.estimation.fused.belief import ACROMION, ARM, Belief
+from ghest_rt.estimation.fused.axial import AxialJudge, twist_rad
+from ghest_rt.estimation.fused.belief import ACROMION, ARM, SIZE, Belief
 from ghest_rt.estimation.fused.drift import DRIFT_SIZE, SLIDE, TURN, DriftJudge, Posture
 from ghest_rt.estimation.fused.filter import FusedFilter
 from ghest_rt.estimation.fused.joints import JointForecast, Joints
 from ghest_rt.estimation.fused.process import Process
+from ghest_rt.estimation.fused.settled import Settled
 from ghest_rt.estimation.fused.sighting import Sighting
 from ghest_rt.estimation.fused.timeline import Timeline
 from ghest_rt.estimation.fused.tuning import Tuning
@@ -20,7 +22,7 @@ from ghest_rt.estimation.inputs import NO_FRAMES, NOT_SEEN, Inputs
 from ghest_rt.estimation.reasons import gravest
 from ghest_rt.estimation.uncertainty import covariance_in_e, euler_sigma_rad
 from ghest_rt.geometry.se3 import inverse
-from ghest_rt.geometry.so3 import Array
+from ghest_rt.geometry.so3 import Array, log_so3, rot_z
 from ghest_rt.messages.results import DriftReport, GhEstimate, MarkerDrift, MarkerObservation, MarkerStatus, Reason, Status
 from ghest_rt.sync.encoder_track import EncoderTrack
 
@@ -36,6 +38,11 @@ _LONGEST_BRIDGE_NS = 3_000_000_000
 _FLAG = 0.5
 # Frames come this much later than usual now and then.
 _JITTER_NS = 8_000_000
+# By how much a joint is moved to see how far it carries camera r1, rad or m.
+_SMALL_STEP = 1e-4
+_ARM_DIAGONAL = slice(ARM.start * (SIZE + 1), ARM.stop * (SIZE + 1), SIZE + 1)
+# Axes of the arm in the elbow frame, docs/frames.md: y of the elbow frame is z of the arm.
+_ELW_FROM_ARM = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 
 
 class FusedEstimator:
@@ -63,6 +70,9 @@ class FusedEstimator:
         self._tuning = tuning or Tuning()
         self._filter = FusedFilter(self._tuning, Process(self._tuning, chain.m1_from_elw[:3, 3]))
         self._judge = DriftJudge(self._tuning, chain.m0_from_gh, chain.m1_from_elw, arm_length_m)
+        self._axial = AxialJudge(self._tuning)
+        self._elbow = Settled(3, self._tuning.reference_s, self._tuning.elbow_memory_s)
+        self._carried: Array | None = None
         self._inputs = Inputs(EncoderTrack(chain.limits), CAMERAS, max_gap_ns)
         self._joints = JointForecast(self._inputs.encoders, max_gap_ns)
         self._patience_ns = [8 * period_ns[camera] // 5 for camera in CAMERAS]
@@ -94,6 +104,9 @@ class FusedEstimator:
             self._start()
         else:
             self._timeline.add(sighting)
+            belief = self._timeline.belief_at(sighting.t_ns)
+            if which and belief is not None:
+                self._compare_elbow(belief, sighting)
 
     def counts(self) -> dict[str, int]:
         """Return how many samples were not used, by reason."""
@@ -107,9 +120,9 @@ class FusedEstimator:
         if known is None or joints is None:
             return lost(t_ns, self._why_nothing(t_ns), self._inputs.newest_ns)
         belief = known.copy()
-        self._filter.process.advance(belief, t_ns, self._e_from_r1(joints), doubt=self._tuning.forecast_doubt)
+        self._forecast(belief, t_ns, joints)
         stale = self._stale(belief, t_ns)
-        posture = self._judge.judge(belief)
+        posture = self._judge.judge(belief, self._elbow_moved(belief))
         e_from_arm = step3_4_5_e_from_arm(posture.e_from_gh, posture.e_from_elw)
         covariance = _rotation_covariance(posture)
         newest_ns = {**self._inputs.newest_ns, "r0": belief.seen_ns[0], "r1": belief.seen_ns[1], "encoders": joints.newest_ns}
@@ -118,6 +131,12 @@ class FusedEstimator:
         m0_from_gh = self._chain.m0_from_gh
         m0_from_arm = eq10_m0_from_arm(posture.e_from_gh @ self._gh_from_m0, e_from_arm)
         gh_from_arm = gh_from_arm_rotation(m0_from_gh, m0_from_arm)
+        slip_rad, slip_variance = self._axial.slip.at(twist_rad(gh_from_arm))
+        if slip_rad or slip_variance:
+            m0_from_arm[:3, :3] = m0_from_arm[:3, :3] @ rot_z(slip_rad)
+            gh_from_arm = gh_from_arm @ rot_z(slip_rad)
+            e_from_arm[:3, :3] = e_from_arm[:3, :3] @ rot_z(slip_rad)
+            covariance = covariance + slip_variance * np.outer(gh_from_arm[:, 2], gh_from_arm[:, 2])
         drift = _report(posture)
         elbow = self._chain.elbow_angles(e_from_arm, joints.positions, posture.covariance[ARM, ARM])
         reason = self._weakness(gh_from_arm, covariance, bool(stale) or joints.gap_ns > _ENCODER_BRIDGE_NS, drift)
@@ -139,14 +158,14 @@ class FusedEstimator:
         joints = self._joints.at(observation.t_capture_ns)
         if joints is None or observation.camera_from_marker is None:
             return None
-        e_from_r1 = self._e_from_r1(joints)
+        e_from_r1 = self._e_from_r1(joints.positions)
         e_from_camera = e_from_r1 if which else self._chain.e_from_camera(CAMERAS[0], joints.positions)
         covariance = self._default if observation.covariance is None else observation.covariance + self._floor
         covariance = covariance_in_e(covariance, e_from_camera)
         if self._chain.needs_encoders(observation.camera):
-            spread_m = self._tuning.encoder_m + self._tuning.forecast_m_s3 * (joints.ahead_ns * 1e-9) ** 3
-            covariance[[0, 1, 2], [0, 1, 2]] += (self._tuning.encoder_rad * spread_m / self._tuning.encoder_m) ** 2
-            covariance[[3, 4, 5], [3, 4, 5]] += spread_m**2
+            turn, place = self._encoder_variance(joints)
+            covariance[[0, 1, 2], [0, 1, 2]] += self._tuning.encoder_rad**2 + turn
+            covariance[[3, 4, 5], [3, 4, 5]] += self._tuning.encoder_m**2 + place
         return Sighting(
             marker=which,
             t_ns=observation.t_capture_ns,
@@ -155,15 +174,60 @@ class FusedEstimator:
             e_from_r1=e_from_r1,
             color_only=observation.status is MarkerStatus.COLOR_ONLY,
             fewer_disks=0 < observation.disks_used < 4,
+            forearm=self._chain.forearm_in_e(joints.positions) if which else None,
         )
+
+    def _forecast(self, belief: Belief, t_ns: int, joints: Joints) -> None:
+        """Move a belief on to an instant that may lie after everything that has arrived."""
+        if t_ns <= belief.t_ns:
+            return
+        self._filter.process.advance(belief, t_ns, self._e_from_r1(joints.positions), doubt=self._tuning.forecast_doubt)
+        turn, place = self._encoder_variance(joints)
+        upper_arm = belief.gh_in_marker[1] - self._chain.m1_from_elw[:3, 3]
+        diagonal = belief.P.ravel()[_ARM_DIAGONAL]
+        diagonal += turn + place / float(upper_arm @ upper_arm)
+
+    def _elbow_moved(self, belief: Belief) -> Array | None:
+        """Return how far the elbow, as m1 shows it, has moved in camera r1: (3,) axes of m1 as calibrated, m."""
+        if not self._elbow.ready:
+            return None
+        in_e = belief.e_from_r1[:3, :3] @ (self._elbow.recent - self._elbow.first)
+        return np.asarray(belief.base[1].turn @ (belief.e_from_marker[1].T @ in_e))
+
+    def _compare_elbow(self, belief: Belief, sighting: Sighting) -> None:
+        """Note where the exoskeleton has the elbow; let the forearm judge whether m1 slips about the arm."""
+        base, R = belief.base[1], sighting.pose[:3, :3]
+        elbow = sighting.pose[:3, 3] + R @ (base.turn.T @ (self._chain.m1_from_elw[:3, 3] - base.slide))
+        self._elbow.add(sighting.t_ns, sighting.e_from_r1[:3, :3].T @ (elbow - sighting.e_from_r1[:3, 3]))
+        forearm = sighting.forearm
+        if forearm is None:
+            return
+        elw_from_e = self._chain.m1_from_elw[:3, :3].T @ base.turn @ R.T
+        gh_from_e = self._chain.m0_from_gh[:3, :3].T @ belief.base[0].turn @ belief.e_from_marker[0].T
+        gh_from_arm = gh_from_e @ elw_from_e.T @ _ELW_FROM_ARM
+        self._axial.add(sighting.t_ns, elw_from_e @ forearm, twist_rad(gh_from_arm))
 
     def _start(self) -> None:
         m0, m1 = self._last
         if m0 is not None and m1 is not None and abs(m0.t_ns - m1.t_ns) <= _START_NS:
             self._timeline = Timeline(self._filter, self._filter.start(m0, m1, self._chain.m0_from_gh))
 
-    def _e_from_r1(self, joints: Joints) -> Array:
-        return self._chain.e_from_camera(CAMERAS[1], joints.positions)
+    def _encoder_variance(self, joints: Joints) -> tuple[float, float]:
+        """Return what the joints' variance means for camera r1: of its rotation (rad^2) and place (m^2), per axis.
+
+        How far each joint carries the camera is measured once, in the first posture: directions change, distances hardly.
+        """
+        if self._carried is None:
+            here = self._e_from_r1(joints.positions)
+            there = [self._e_from_r1(joints.positions + step) for step in _SMALL_STEP * np.eye(len(joints.positions))]
+            turns = [float(np.sum(np.square(log_so3(T[:3, :3] @ here[:3, :3].T)))) for T in there]
+            places = [float(np.sum(np.square(T[:3, 3] - here[:3, 3]))) for T in there]
+            self._carried = np.array([turns, places]) / (3.0 * _SMALL_STEP**2)
+        turn, place = (self._carried @ joints.variance).tolist()
+        return turn, place
+
+    def _e_from_r1(self, positions: Array) -> Array:
+        return self._chain.e_from_camera(CAMERAS[1], positions)
 
     def _stale(self, belief: Belief, t_ns: int) -> tuple[int, ...]:
         """Return the markers whose newest sighting is older than latency and frame rate account for."""

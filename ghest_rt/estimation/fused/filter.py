@@ -117,6 +117,7 @@ class FusedFilter:
         belief.straighten(which)
         if outcome is Outcome.TAKEN:
             self._adapt(belief, which, foretold.turn_surprise())
+            self._loosen(belief, which, foretold.place_surprise())
         belief.streaks = _with(belief.streaks, which, Streak())
         belief.seen_ns = _with(belief.seen_ns, which, sighting.t_ns)
         return outcome
@@ -146,6 +147,20 @@ class FusedFilter:
         agility = min(max(belief.agility[which] * math.exp(push), tuning.least_agility), tuning.most_agility)
         belief.agility = _with(belief.agility, which, agility)
         belief.surprise = _with(belief.surprise, which, turn)
+
+    def _loosen(self, belief: Belief, which: int, place: Array) -> None:
+        """Let the GH centre creep in the markers as long as m0 and m1 contradict each other about where it is.
+
+        Args:
+            belief: Changed in place.
+            which: The marker.
+            place: (3,) innovation of the GH centre's place by this marker, whitened.
+        """
+        tuning = self._tuning
+        against = min(max(-float(place @ belief.strain[1 - which]) / 3.0, -1.0), 3.0)
+        push = tuning.slack_gain * (against - tuning.slack_fall)
+        belief.slack = min(max(belief.slack * math.exp(push), 1.0), tuning.most_slack)
+        belief.strain = _with(belief.strain, which, place)
 
     def _has_jumped(self, streak: Streak, t_ns: int) -> bool:
         return streak.count >= self._tuning.jump_count and t_ns - streak.since_ns >= self._tuning.jump_span_ns
@@ -189,6 +204,11 @@ class _Update:
     def turn_surprise(self) -> Array:
         """Return the (3,) innovation of the rotation, whitened."""
         return whitened_3(self.spread[:3, :3], self._residual[:3])
+
+    def place_surprise(self) -> Array:
+        """Return the (3,) innovation of the position, judged by the measured rotation, whitened."""
+        T = self._without_rotation
+        return whitened_3(T @ self.spread @ T.T, T @ self._residual)
 
     def apply(self, belief: Belief) -> None:
         """Correct a belief."""

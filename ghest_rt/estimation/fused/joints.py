@@ -1,18 +1,27 @@
-"""The joint positions at any instant, a little beyond the newest encoder sample too."""
+"""The joint positions at any instant, a little beyond the newest encoder sample too, and how uncertain they are."""
 
 from collections import deque
 from dataclasses import dataclass
 
+import numpy as np
+
 from ghest_drivers.samples import EncoderSample
+from ghest_rt.estimation.fused.small import inverse_3
 from ghest_rt.geometry.so3 import Array
 from ghest_rt.sync.encoder_track import EncoderTrack
 from ghest_rt.sync.miss import Miss
 
 # Curvature is trusted this far ahead; beyond, the forecast goes straight on.
-_CURVED_NS = 20_000_000
+_CURVED_S = 0.020
 # Samples nearer together or farther apart than this give no rate.
 _LEAST_STEP_NS = 4_000_000
 _MOST_STEP_NS = 60_000_000
+# The two forecasts: a parabola through three samples, and one fitted to more of them where encoders are coarse.
+_FITTED = (3, 7)
+# Share of the newest sample in what is known of a forecast's errors.
+_FOLLOW = 0.04
+# A parabola through three samples, carried on by one step, errs by 4.5 times the error of a sample.
+_ONE_STEP = 20.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -21,19 +30,24 @@ class Joints:
 
     Attributes:
         positions: (n,) rad (m for prismatic joints), in the order of the encoder link.
+        variance: (n,) of them, by resolution and forecast.
         ahead_ns: How far the instant lies beyond the newest sample; 0 where samples lie around it.
         gap_ns: Time between the samples around it, or `ahead_ns`.
         newest_ns: Latch time of the newest sample they rest on.
     """
 
     positions: Array
+    variance: Array
     ahead_ns: int
     gap_ns: int
     newest_ns: int
 
 
 class JointForecast:
-    """Interpolates between encoder samples and forecasts from the last three, never farther than asked."""
+    """Interpolates between encoder samples and forecasts from the last few, never farther than asked.
+
+    Two forecasts compete, joint by joint; the one that has lately foretold samples better is used.
+    """
 
     def __init__(self, encoders: EncoderTrack, max_gap_ns: int) -> None:
         """Start without samples.
@@ -44,52 +58,91 @@ class JointForecast:
         """
         self._encoders = encoders
         self._max_gap_ns = max_gap_ns
-        self._last: deque[EncoderSample] = deque(maxlen=3)
-        # Per ns and per ns^2: divided differences of the last samples; None where they are too far apart.
-        self._slope: Array | None = None
-        self._bend: Array | None = None
+        self._last: deque[EncoderSample] = deque(maxlen=max(_FITTED))
+        self._step_s = 0.0
+        # (2, 3, n): of each forecast and joint, position, rate and half the acceleration at the newest sample.
+        self._parabolas: Array | None = None
+        self._chosen: Array | None = None
+        # (2, n): mean squares of the errors of each forecast by one step; None before there are any.
+        self._errors: Array | None = None
+        # (n,) mean squares of the errors of a sample, and of the better forecast by one step.
+        self._of_sample = self._of_step = np.zeros(0)
 
     def add(self, sample: EncoderSample) -> None:
         """Note a sample that the track has taken."""
-        if not self._last or sample.t_capture_ns - self._last[-1].t_capture_ns >= _LEAST_STEP_NS:
-            self._last.append(sample)
-            self._slope, self._bend = self._differences()
+        last = self._last
+        step_ns = sample.t_capture_ns - last[-1].t_capture_ns if last else 0
+        if last and step_ns < _LEAST_STEP_NS:
+            return
+        if step_ns > _MOST_STEP_NS:
+            last.clear()
+        elif self._parabolas is not None:
+            self._judge(sample, step_ns * 1e-9)
+        last.append(sample)
+        self._step_s = step_ns * 1e-9
+        self._parabolas = np.array([_parabola(last, count) for count in _FITTED]) if len(last) >= min(_FITTED) else None
+        self._chosen = self._choose()
 
     def at(self, t_ns: int) -> Joints | None:
         """Return the joints at `t_ns`; None if the encoders say nothing about it."""
         found = self._encoders.at(t_ns, self._max_gap_ns)
         if not isinstance(found, Miss):
-            return Joints(found.positions, 0, found.gap_ns, found.newest_ns)
+            return Joints(found.positions, self._variance(0.0), 0, found.gap_ns, found.newest_ns)
         if found is not Miss.NOT_YET or not self._last:
             return None
         newest_ns = self._last[-1].t_capture_ns
         ahead_ns = t_ns - newest_ns
         if ahead_ns > self._max_gap_ns:
             return None
-        return Joints(self._forecast(ahead_ns), ahead_ns, ahead_ns, newest_ns)
+        return Joints(self._forecast(ahead_ns * 1e-9), self._variance(ahead_ns * 1e-9), ahead_ns, ahead_ns, newest_ns)
 
-    def _forecast(self, ahead_ns: int) -> Array:
-        """Newton's interpolation polynomial through the last samples, carried on."""
-        last = self._last[-1]
-        if self._slope is None:
-            return last.angles_rad
-        straight = last.angles_rad + ahead_ns * self._slope
-        if self._bend is None:
-            return straight
-        curved_ns = min(ahead_ns, _CURVED_NS)
-        return straight + curved_ns * (curved_ns + last.t_capture_ns - self._last[-2].t_capture_ns) * self._bend
+    def _forecast(self, ahead_s: float) -> Array:
+        if self._chosen is None:
+            last = self._last[-1]
+            if len(self._last) < 2:
+                return last.angles_rad
+            before = self._last[-2]
+            slope = (last.angles_rad - before.angles_rad) / (last.t_capture_ns - before.t_capture_ns)
+            return np.asarray(last.angles_rad + (ahead_s * 1e9) * slope)
+        curved_s = min(ahead_s, _CURVED_S)
+        position, rate, bend = self._chosen
+        return np.asarray(position + ahead_s * rate + curved_s * (2.0 * ahead_s - curved_s) * bend)
 
-    def _differences(self) -> tuple[Array | None, Array | None]:
-        if len(self._last) < 2 or not _regular(self._last[-2], self._last[-1]):
-            return None, None
-        second, last = self._last[-2], self._last[-1]
-        slope = (last.angles_rad - second.angles_rad) / (last.t_capture_ns - second.t_capture_ns)
-        if len(self._last) < 3 or not _regular(self._last[-3], second):
-            return slope, None
-        third = self._last[-3]
-        before = (second.angles_rad - third.angles_rad) / (second.t_capture_ns - third.t_capture_ns)
-        return slope, (slope - before) / (last.t_capture_ns - third.t_capture_ns)
+    def _variance(self, ahead_s: float) -> Array:
+        """Errors between samples are those of samples; those of a forecast grow from there as they have been seen to."""
+        if self._errors is None:
+            return np.zeros(len(self._last[-1].angles_rad) if self._last else 0)
+        if ahead_s == 0.0 or self._step_s == 0.0:
+            return self._of_sample
+        reach = ahead_s / self._step_s
+        growth = reach * reach if reach < 1.0 else reach**4
+        return np.asarray(self._of_sample + growth * self._of_step)
+
+    def _judge(self, sample: EncoderSample, step_s: float) -> None:
+        """Learn from what a new sample shows of the forecasts."""
+        if self._parabolas is None:
+            return
+        position, rate, bend = self._parabolas[:, 0], self._parabolas[:, 1], self._parabolas[:, 2]
+        missed = position + step_s * rate + (step_s * step_s) * bend - sample.angles_rad
+        squares = missed * missed
+        errors = squares if self._errors is None else self._errors + _FOLLOW * (squares - self._errors)
+        self._errors = errors
+        self._of_sample, self._of_step = errors[0] * (1.0 / _ONE_STEP), np.minimum(errors[0], errors[1])
+
+    def _choose(self) -> Array | None:
+        if self._parabolas is None or self._errors is None:
+            return None if self._parabolas is None else np.asarray(self._parabolas[0])
+        return np.asarray(np.where(self._errors[1] < self._errors[0], self._parabolas[1], self._parabolas[0]))
 
 
-def _regular(earlier: EncoderSample, later: EncoderSample) -> bool:
-    return later.t_capture_ns - earlier.t_capture_ns <= _MOST_STEP_NS
+def _parabola(samples: deque[EncoderSample], count: int) -> Array:
+    """Return the (3, n) parabola fitted to the last `count` samples: position, rate, half the acceleration at the newest."""
+    chosen = [samples[k] for k in range(max(len(samples) - count, 0), len(samples))]
+    newest_ns = chosen[-1].t_capture_ns
+    t = np.array([(sample.t_capture_ns - newest_ns) * 1e-9 for sample in chosen])
+    A = np.array([np.ones(len(chosen)), t, t * t])
+    # Times in units of the span, so that the normal matrix is well scaled.
+    scale = np.array([1.0, -1.0 / t[0], 1.0 / (t[0] * t[0])])
+    A = scale[:, None] * A
+    fitted = inverse_3(A @ A.T) @ (A @ np.array([sample.angles_rad for sample in chosen]))
+    return np.asarray(scale[:, None] * fitted)

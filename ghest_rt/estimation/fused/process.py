@@ -95,7 +95,7 @@ class Process:
         diagonal[_RATE_POSE] += cross
         creep = diagonal[_GH]
         if creep.max() < self._most:
-            creep += dt * self._creep
+            creep += (dt * belief.slack) * self._creep
 
     def _agility(self, belief: Belief, which: int, t_ns: int) -> float:
         unseen = t_ns - belief.seen_ns[which] > _UNSEEN_NS

@@ -23,9 +23,8 @@ class Tuning:
         forecast_doubt: Factor on the process noise after the newest sighting: nothing corrects a forecast that is published.
         rotation_floor_rad: Added to the standard deviation of every measured rotation.
         position_floor_m: Added to that of every measured position.
-        encoder_m: Standard deviation of a marker's position in E that comes from the encoders.
+        encoder_m: Standard deviation of a marker's position in E that comes from the exoskeleton, resolution of encoders aside.
         encoder_rad: The same of its rotation.
-        forecast_m_s3: Times the cube of the time the joints are forecast over: what the forecast adds to `encoder_m`.
         default_rotation_rad: Standard deviation of a measured rotation that comes without covariance.
         default_position_m: The same of a position.
         surprising: A normalised innovation squared above this is unforeseen movement, as far as a surge explains it.
@@ -38,6 +37,9 @@ class Tuning:
         jump_span_ns: Least time they must span.
         regain_count: After this many outliers in a row, alike or not, the marker is taken as it is seen.
         creep_m2_s: How fast the GH centre may creep in the frame of m0 and of m1, m^2/s.
+        slack_gain: How fast the creep grows while the markers contradict each other about the GH centre.
+        slack_fall: How fast it falls while they do not.
+        most_slack: The greatest factor on the creep.
         unknown_gh_m: Standard deviation of the GH centre in a marker's frame before anything is seen.
         slide_m: Standard deviation of a slide, if there is one, per axis: m0, m1.
         turn_rad: The same of a turn.
@@ -48,6 +50,18 @@ class Tuning:
         slide_cost: Twice the logarithm of the odds against a slide.
         turn_cost: Twice the logarithm of the odds against a turn.
         arm_length_m: Standard deviation of a calibrated arm length.
+        axial_memory_s: The disagreement of forearm and m1 about the arm is averaged over this time; faster is movement.
+        reference_s: Over this time at first it is learned how forearm and m1 agree, and where the elbow is.
+        elbow_memory_s: Over which time the elbow's place is averaged after that.
+        elbow_m: How far the elbow may wander in camera r1, per axis.
+        axial_noise_rad2_s: Spectral density of the forearm's wander against the arm during movement.
+        axial_tolerance_rad: What forearm and m1 may come to disagree by without a slip.
+        axial_shift_rad: Standard deviation of a slip of m1 about the arm, if there is one.
+        axial_shift_cost: Twice the logarithm of the odds against it.
+        lag_memory_s: Over which time the lag of m1 behind the axial rotation is learned.
+        lag_sigma: Standard deviation of that lag, if there is one, rad per rad.
+        lag_tolerance: What the forearm may seem to lead by without a lag.
+        lag_cost: Twice the logarithm of the odds against a lag.
         unknown_arm_length_m: Prior standard deviation of the arm length where it is not calibrated.
     """
 
@@ -58,16 +72,15 @@ class Tuning:
     starting_agility: float = 100.0
     most_agility: float = 1e6
     bridging_agility: tuple[float, float] = (1000.0, 300.0)
-    agility_gain: float = 0.2
-    agility_fall: float = 0.15
+    agility_gain: float = 0.15
+    agility_fall: float = 0.35
     agility_rest: float = 0.2
     still_rad_s: float = 0.03
-    forecast_doubt: float = 5.0
+    forecast_doubt: float = 3.0
     rotation_floor_rad: float = math.radians(0.003)
     position_floor_m: float = 3e-6
-    encoder_m: float = 2e-4
-    encoder_rad: float = math.radians(0.005)
-    forecast_m_s3: float = 10.0
+    encoder_m: float = 3e-5
+    encoder_rad: float = math.radians(0.002)
     default_rotation_rad: float = math.radians(0.3)
     default_position_m: float = 5e-4
     surprising: float = 22.0
@@ -79,15 +92,30 @@ class Tuning:
     jump_count: int = 4
     jump_span_ns: int = 40_000_000
     regain_count: int = 8
-    creep_m2_s: tuple[float, float] = (1e-6, 1e-7)
+    creep_m2_s: tuple[float, float] = (3e-7, 3e-8)
+    slack_gain: float = 1.5
+    slack_fall: float = 0.1
+    most_slack: float = 3e3
     unknown_gh_m: float = 0.04
     slide_m: tuple[float, float] = (0.02, 0.015)
     turn_rad: tuple[float, float] = (math.radians(3.0), math.radians(3.0))
     calibrated_m: float = 1e-3
     calibrated_rad: float = math.radians(0.3)
-    exact_m: float = 2e-5
-    exact_rad: float = math.radians(0.005)
+    exact_m: float = 1e-5
+    exact_rad: float = math.radians(0.001)
     slide_cost: float = 12.0
     turn_cost: float = 15.0
+    axial_memory_s: float = 1.0
+    reference_s: float = 2.0
+    elbow_memory_s: float = 0.3
+    elbow_m: float = 0.0025
+    axial_noise_rad2_s: float = math.radians(0.5) ** 2 * 0.3
+    axial_tolerance_rad: float = math.radians(1.0)
+    axial_shift_rad: float = math.radians(8.0)
+    axial_shift_cost: float = 8.0
+    lag_memory_s: float = 30.0
+    lag_sigma: float = 0.3
+    lag_tolerance: float = 0.04
+    lag_cost: float = 8.0
     arm_length_m: float = 1e-3
     unknown_arm_length_m: float = 0.05
