@@ -12,6 +12,7 @@ from ghest_rt.studies.engine.store import ResultStore
 from ghest_rt.studies.movements import METHODS, Movements, frames_of
 from ghest_rt.studies.rivals.angle_errors import QUANTITIES
 from ghest_rt.studies.rivals.contenders import CONTENDERS
+from ghest_rt.studies.rivals.running import REST_S
 from ghest_rt.studies.rivals.tasks import compare_task
 from ghest_rt.studies.session.scenario import Scenario
 
@@ -44,8 +45,9 @@ def compare(
     """Run the comparison; return its summary, as JSON takes it.
 
     Returns:
-        `settings`; `rows`, one per sensor, movement, seed and contender; `contenders`, with their publications' figures and the
-        means over movements; `verdicts`, one per sensor, movement and contender.
+        `settings`; `inertial_after_rest`, the inertial rival's error after the patient has held still; `rows`, one per sensor,
+        movement, seed and contender; `contenders`, with their publications' figures and the means over movements; `verdicts`,
+        one per sensor, movement and contender.
 
     Raises:
         BadInputError: A motion file cannot be read.
@@ -67,10 +69,20 @@ def compare(
             "seeds": settings.seeds,
             "duration_s": settings.movements.duration_s,
         },
+        "inertial_after_rest": {
+            "rest_s": REST_S,
+            "error_deg": _mean_by_seed(scenarios, results),
+        },
         "rows": rows,
         "contenders": [{**asdict(who), "measured": _means(rows, key)} for key, who in CONTENDERS.items()],
         "verdicts": _verdicts(rows),
     }
+
+
+def _mean_by_seed(scenarios: Sequence[Scenario], results: Sequence[Mapping[str, object]]) -> float:
+    """Return the mean of what the inertial rival drifts to, over the sensors' seeds."""
+    drift = {s.seed: float(cast(float, r["inertial_after_rest_deg"])) for s, r in zip(scenarios, results, strict=True)}
+    return fmean(drift.values())
 
 
 def _rows(scenario: Scenario, result: Mapping[str, object]) -> list[Row]:

@@ -26,7 +26,6 @@ TITLES = {
 }
 _LEAST_IN_BIN = 10
 _COMPUTING_S = 0.6
-_COMPUTING_FRAMES = 25
 
 Row = dict[str, object]
 
@@ -40,15 +39,17 @@ class LatencySettings:
         speeds: Factors on the speed.
         sensor: Kind of sensors.
         seed: Of the simulation.
+        computing_frames: How many frames the computing time is measured on.
     """
 
     movements: Movements
     speeds: tuple[float, ...] = (0.5, 1.0, 2.0, 3.0)
     sensor: Literal["paper", "sr300"] = "paper"
     seed: int = 1
+    computing_frames: int = 25
 
 
-QUICK = LatencySettings(movements=Movements(("COMB",), duration_s=1.2), speeds=(1.0, 3.0))
+QUICK = LatencySettings(movements=Movements(("COMB",), duration_s=1.2), speeds=(1.0, 3.0), computing_frames=10)
 """Enough to see that everything runs."""
 
 _SPAN_S = 8.0
@@ -88,7 +89,9 @@ def latency(
     ]
     pooled = {key: _pooled([result[key] for result in found]) for key in CANDIDATES}
     clinic = scenarios[0].undisturbed().model_copy(update={"duration_s": _COMPUTING_S}).world()
-    computing = {key: measure_computing(clinic, method, _COMPUTING_FRAMES, clock) for key, (method, _) in CANDIDATES.items()}
+    computing = {
+        key: measure_computing(clinic, method, settings.computing_frames, clock) for key, (method, _) in CANDIDATES.items()
+    }
     return {
         "study": "latency",
         "settings": {

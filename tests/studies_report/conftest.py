@@ -49,7 +49,13 @@ def _values(job: Job) -> dict[str, object]:
             }
             for k, key in enumerate(CONTENDERS)
         }
-        return {"duration_s": 1.0, "girdle_turn_deg": 4.25, "straight_forecast_deg": 0.125, "contenders": errors}
+        return {
+            "duration_s": 1.0,
+            "inertial_after_rest_deg": 7.5,
+            "girdle_turn_deg": 4.25,
+            "straight_forecast_deg": 0.125,
+            "contenders": errors,
+        }
     if job.task.kind.endswith("judge_speed"):
         speed = np.linspace(0.0, 50.0, 60)
         return {
@@ -111,7 +117,9 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
     document = write_results(folder, "compare", compared, compared["rows"])  # type: ignore[arg-type]
     picture(draw_contenders(document, "paper"), folder / "compare" / "figures", "contenders_paper")
     picture(draw_angles(document, "paper"), folder / "compare" / "figures", "angles_paper")
-    late = latency(LatencySettings(movements=some), store, Invented(), clock=iter(range(0, 10**12, 10**6)).__next__)
+    late = latency(
+        LatencySettings(movements=some, computing_frames=1), store, Invented(), clock=iter(range(0, 10**12, 10**6)).__next__
+    )
     document = write_results(folder, "latency", late, late["rows"])  # type: ignore[arg-type]
     picture(draw_latency(document), folder / "latency" / "figures", "latency")
     write_summary(accuracy_summary(), folder / "accuracy")

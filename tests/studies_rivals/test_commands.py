@@ -32,6 +32,8 @@ def test_compare_puts_every_contender_on_the_same_session(tmp_path: Path) -> Non
     verdicts = {v["contender"]: v for v in document["verdicts"]}  # type: ignore[attr-defined]
     assert set(verdicts) == set(CONTENDERS) - {"fused"}
     assert all(v["verdict"] for v in verdicts.values())
+    rest = document["inertial_after_rest"]
+    assert rest["error_deg"] > 10 * rows["fused"]["orientation_deg"]  # type: ignore[index]
     folder = tmp_path / "compare"
     assert json.loads((folder / "summary.json").read_text()) == document
     assert pq.read_table(folder / "rows.parquet").num_rows == len(CONTENDERS)

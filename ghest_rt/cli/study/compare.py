@@ -82,6 +82,11 @@ def _print(summary: dict[str, Any], folder: Path) -> None:
     console.print(
         "publ.: judged at the instant of publishing; fused wins: movements in which it is nearer in all other columns"
     )
+    rest = summary["inertial_after_rest"]
+    console.print(
+        f"inertial sensors drift: off by {_deg(rest['error_deg'])}° after holding still for {rest['rest_s']:.0f} s",
+        highlight=False,
+    )
     console.print("\nWhat their own publications report:", highlight=False)
     for who in contenders:
         if who["published"] != "none":

@@ -51,12 +51,16 @@ def compare_section(summary: Row, folder: Path) -> Section:
         statements_title="Does fused win?",
         statements=_statements(summary),
         badges=("always", "not always"),
-        notes=tuple(
-            (who["title"], f"After {who['source']}. Its own publication: {who['published']}. To bear in mind: {who['caveat']}.")
-            for who in contenders
-            if not who["ours"]
-        ),
+        notes=tuple((who["title"], _note(who, summary)) for who in contenders if not who["ours"]),
     )
+
+
+def _note(who: Row, summary: Row) -> str:
+    text = f"After {who['source']}. Its own publication: {who['published']}. To bear in mind: {who['caveat']}."
+    if who["key"] == "inertial":
+        rest = summary["inertial_after_rest"]
+        text += f" Measured here: after holding still for {rest['rest_s']:.0f} s it is off by {number(rest['error_deg'])}°."
+    return text
 
 
 def _table(summary: Row, sensor: str, kind: str) -> Table:

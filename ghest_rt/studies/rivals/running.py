@@ -1,14 +1,16 @@
 """The rivals over an observed session, on the grid of the marker methods."""
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from ghest_drivers.samples import EncoderSample
 from ghest_rt.estimation.interface import GhEstimator
-from ghest_rt.geometry.so3 import Array
+from ghest_rt.geometry.so3 import Array, angle_between_rad
 from ghest_rt.messages.results import TruthSample
-from ghest_rt.simulation.anatomy import Anatomy, anatomy
+from ghest_rt.simulation.anatomy import anatomy
 from ghest_rt.simulation.scene import arm_from_elw
 from ghest_rt.simulation.sensors import find_sensors
 from ghest_rt.studies.rivals.angle_errors import Answers, truth_track
@@ -16,13 +18,16 @@ from ghest_rt.studies.rivals.contenders import CONTENDERS
 from ghest_rt.studies.rivals.coupled_chain import CoupledChain
 from ghest_rt.studies.rivals.encoder_only import EncoderOnlyEstimator, PostureModel
 from ghest_rt.studies.rivals.exoskeleton_alone import ExoskeletonAlone
-from ghest_rt.studies.rivals.inertial import ImuProfile, InertialEstimator, simulate_imus
+from ghest_rt.studies.rivals.inertial import ImuProfile, ImuTrack, InertialEstimator, simulate_imus
 from ghest_rt.studies.rivals.neutral import NeutralCalibration, calibrate
 from ghest_rt.studies.rivals.swivel import SwivelAngle
 from ghest_rt.studies.session.observed import Observed
 
 WITHOUT_CAMERAS = ("exoskeleton", "coupled_chain", "swivel", "swivel_wrist", "inertial")
 """The rivals that look at no marker."""
+
+REST_S = 120.0
+"""How long the patient holds still to show what drift does to inertial sensors."""
 
 _HEIGHT_M = 1.75  # the patient's in every study
 
@@ -46,7 +51,7 @@ def run_without_cameras(
         key: EncoderOnlyEstimator(model, calibration.kinematics.limits, max_gap_ns)
         for key, model in encoder_models(calibration).items()
     }
-    estimators["inertial"] = _inertial(session, body, imu or ImuProfile(), seed)
+    estimators["inertial"] = _inertial_in_motion(session, imu or ImuProfile(), seed)
     return {
         key: run_estimator(estimator, session.encoders, instants_ns, round((CONTENDERS[key].lag_ms or 0.0) * 1e6))
         for key, estimator in estimators.items()
@@ -78,7 +83,23 @@ def run_estimator(
     return Answers.of(estimates, lag_ns)
 
 
-def _inertial(session: Observed, body: Anatomy, profile: ImuProfile, seed: int) -> InertialEstimator:
+def inertial_after_rest_deg(session: Observed, seed: int, rest_s: float = REST_S) -> float:
+    """Return by how much the inertial rival is off after the patient of a session has held still: what drift does in time.
+
+    Args:
+        session: Its first posture is held.
+        seed: Seeds the sensors.
+        rest_s: How long.
+    """
+    still = session.truth[0]
+    end_ns = round(rest_s * 1e9)
+    tracks = simulate_imus(lambda t_ns: replace(still, t_ns=t_ns), 0, end_ns, ImuProfile(), seed)
+    estimator = _inertial(session, tracks)
+    rotation = estimator.estimate(end_ns).gh_from_arm
+    return math.nan if rotation is None else math.degrees(angle_between_rad(still.gh_from_arm, rotation))
+
+
+def _inertial_in_motion(session: Observed, profile: ImuProfile, seed: int) -> InertialEstimator:
     truth: Sequence[TruthSample] = session.truth
     track = truth_track(truth)
     step_ns = round(1e9 / profile.rate_hz)
@@ -89,8 +110,12 @@ def _inertial(session: Observed, body: Anatomy, profile: ImuProfile, seed: int) 
             raise ValueError(f"no truth at {t_ns} ns")
         return found
 
-    scapula, arm = simulate_imus(truth_at, truth[0].t_ns + step_ns, truth[-1].t_ns - 3 * step_ns, profile, seed)
+    tracks = simulate_imus(truth_at, truth[0].t_ns + step_ns, truth[-1].t_ns - 3 * step_ns, profile, seed)
+    return _inertial(session, tracks)
+
+
+def _inertial(session: Observed, tracks: tuple[ImuTrack, ImuTrack]) -> InertialEstimator:
     calibration = session.station.config.calibration
     gh_from_m0: Array = np.array(calibration.m0_from_gh)[:3, :3].T
-    arm_from_m1 = (arm_from_elw(body.upper_arm_m) @ np.linalg.inv(np.array(calibration.m1_from_elw)))[:3, :3]
-    return InertialEstimator(scapula, arm, gh_from_m0, np.asarray(arm_from_m1))
+    arm_from_m1 = (arm_from_elw(anatomy(_HEIGHT_M).upper_arm_m) @ np.linalg.inv(np.array(calibration.m1_from_elw)))[:3, :3]
+    return InertialEstimator(*tracks, gh_from_m0, np.asarray(arm_from_m1))
