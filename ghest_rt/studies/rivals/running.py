@@ -1,7 +1,7 @@
 """The rivals over an observed session, on the grid of the marker methods."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
