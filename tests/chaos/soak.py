@@ -191,7 +191,7 @@ def draw(readings: list[Reading], report: dict[str, Any], path: Path) -> None:
     valid.set(ylabel="share of each\nsecond (%)", ylim=(-5, 105), xlabel="minutes")
     for axes in (memory, handles, late, valid):
         axes.grid(alpha=0.3)
-        axes.legend(loc="center right", fontsize=8)
+        axes.legend(loc="lower right", bbox_to_anchor=(1.0, 0.99), ncols=3, fontsize=8, frameon=False)
     figure.suptitle(
         f"{report['minutes']:g} min, {report['samples']} samples, {report['faults_injected']} device faults: "
         f"memory {report['memory_mb_per_hour']:+.1f} MB/h, stale as fresh {report['stale_as_fresh']}"
