@@ -47,6 +47,7 @@ class Hub:
         self._connections: Mapping[str, Connection] = {}
         self._connected: dict[str, ConnectionChanged] = {}
         self._last_told: dict[str, Sample] = {}
+        self._last_events: dict[str, Event] = {}
         self._refused: set[Refused] = set()
         self._receivers: tuple[Updates, ...] = ()
         self._thread = threading.Thread(target=self._work, name="ghest-client", daemon=True)
@@ -129,8 +130,10 @@ class Hub:
             self._receivers = tuple([receiver for receiver in self._receivers if receiver.put(update)])
 
     def _handle(self, t_ns: int, arrival: Arrival) -> None:
-        if arrival.station and arrival.station not in self.trackers and len(self.trackers) >= _MOST_STATIONS:
-            return
+        if arrival.station and arrival.station not in self.trackers:
+            if len(self.trackers) >= _MOST_STATIONS:
+                return
+            self._tracker(arrival.station)
         try:
             self._tell(self._read(t_ns, arrival))
         except RefusedError as error:
@@ -143,7 +146,7 @@ class Hub:
             case Kind.HEALTH:
                 return [HealthReport(arrival.station, read_message(Health, arrival.payload))]
             case Kind.EVENT:
-                return [EventReport(arrival.station, read_message(Event, arrival.payload))]
+                return [self._event(arrival.station, read_message(Event, arrival.payload))]
             case Kind.TOKEN | Kind.TOKEN_GONE:
                 return self._on_token(t_ns, arrival)
             case Kind.FILLED if arrival.request is not None:
@@ -153,6 +156,13 @@ class Hub:
         return (
             tracker.on_last(message, t_ns) if arrival.kind is Kind.LAST else tracker.on_message(arrival.endpoint, message, t_ns)
         )
+
+    def _event(self, station: str, message: Event) -> EventReport:
+        before = self._last_events.get(station)
+        self._last_events[station] = message
+        if before is None or before.run_id != message.run_id:
+            return EventReport(station, message)
+        return EventReport(station, message, missed=max(0, message.seq - before.seq - 1))
 
     def _on_token(self, t_ns: int, arrival: Arrival) -> list[Update]:
         alive = arrival.kind is Kind.TOKEN
@@ -172,6 +182,9 @@ class Hub:
 
     def _tracker(self, station: str) -> StationTracker:
         if station not in self.trackers:
-            tracker = StationTracker(station, self._limits, self._fill, self._now_ns())
+            t_ns = self._now_ns()
+            tracker = StationTracker(station, self._limits, self._fill, t_ns)
+            for endpoint, change in self._connected.items():
+                tracker.on_connection(endpoint, change.connected, t_ns)
             self.trackers = {**self.trackers, station: tracker}  # a new one: other threads may be reading
         return self.trackers[station]

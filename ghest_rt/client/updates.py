@@ -154,10 +154,17 @@ class HealthReport:
 
 @dataclass(frozen=True, slots=True)
 class EventReport:
-    """Something happened at a station."""
+    """Something happened at a station.
+
+    Attributes:
+        station: Which.
+        message: What.
+        missed: Events between the one before and this one that did not reach us; the station keeps none.
+    """
 
     station: str
     message: Event
+    missed: int = 0
 
 
 Update = Sample | Gap | Restarted | LinkChanged | ConnectionChanged | Refused | HealthReport | EventReport

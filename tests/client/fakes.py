@@ -104,11 +104,11 @@ class FakeStation:
             self.publish(period_s=period_s)
         return self.next_seq - first_seq
 
-    def event(self, text: str) -> None:
+    def event(self, text: str, seq: int = 0) -> None:
         self.publisher.event(
             Event(
                 run_id=self.run_id,
-                seq=0,
+                seq=seq,
                 t_ns=0,
                 t_unix_ns=0,
                 severity="info",

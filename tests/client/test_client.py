@@ -193,8 +193,11 @@ def test_events_come_and_documents_can_be_asked_for() -> None:
     with FakeStation() as station, GhestClient(station.endpoint) as client:
         told = Told(client.updates())
         station.publish_until(lambda: client.latest("one") is not None)
-        station.event("hello")
-        told.wait(lambda: any(isinstance(update, EventReport) and update.message.message == "hello" for update in told.all))
+        station.event("hello", seq=3)
+        station.event("again", seq=6)
+        told.wait(lambda: len([update for update in told.all if isinstance(update, EventReport)]) == 2)
+        events = [update for update in told.all if isinstance(update, EventReport)]
+        assert [(event.message.message, event.missed) for event in events] == [("hello", 0), ("again", 2)]
         calibration = client.ask("one", "calibration")
         assert isinstance(calibration, dict) and "m0_from_gh" in calibration
         with pytest.raises(GhestError, match="nobody"):
