@@ -129,11 +129,10 @@ def figure_of(path: Path, caption: str, *, folded: bool = False) -> Figure:
 
 
 def number(value: float | None, scale: float = 1.0) -> str:
-    """Return a number with three significant digits, or a dash."""
+    """Return a number with three digits, or a dash."""
     if value is None:
         return "–"
     scaled = scale * value
-    if abs(scaled) >= 100:
+    if abs(scaled) >= 99.95:
         return f"{scaled:.0f}"
-    digits = 2 if abs(scaled) >= 1 else 3
-    return f"{scaled:.{digits}f}" if abs(scaled) < 10 else f"{scaled:.1f}"
+    return f"{scaled:#.3g}" if abs(scaled) >= 0.1 else f"{scaled:.3f}"
