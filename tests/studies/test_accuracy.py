@@ -72,9 +72,9 @@ def test_the_interval_is_students() -> None:
 
 
 def test_the_papers_statements_hold_for_its_own_figures_and_fail_for_others() -> None:
-    assert [check.holds for check in checks(table(made_up(papers())))] == [True, True]
+    assert [check.holds for check in checks(table(made_up(papers())))] == [True, True, True]
     turned = papers() | {("m0_m", "SIR"): 0.01, ("position_m", "SFE"): 0.01}
-    assert [check.holds for check in checks(table(made_up(turned)))] == [False, False]
+    assert [check.holds for check in checks(table(made_up(turned)))] == [False, False, False]
     assert checks([e for e in table(made_up(papers())) if e["movement"] != "SIR"]) == []
 
 

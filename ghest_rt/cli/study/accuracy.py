@@ -70,15 +70,15 @@ def accuracy(
 
         print_json(document)
     else:
-        _show(entries, found, folder)
+        _show(document, folder)
 
 
-def _show(entries: list[dict[str, Any]], checks: list[dict[str, Any]], folder: Path) -> None:
+def _show(document: dict[str, Any], folder: Path) -> None:
     from rich import box
     from rich.console import Console
     from rich.table import Table
 
-    from ghest_rt.cli.study.running import show_checks
+    from ghest_rt.cli.study.running import show_end
 
     shown = Table(
         title="RMS errors, mean over seeds, ± half its 95 % confidence interval (Tables 5, 6)",
@@ -91,7 +91,7 @@ def _show(entries: list[dict[str, Any]], checks: list[dict[str, Any]], folder: P
     for title in _TITLES.values():
         shown.add_column(title, justify="right", no_wrap=True)
     by_place: dict[tuple[str, str, str], dict[str, dict[str, Any]]] = {}
-    for e in entries:
+    for e in document["table"]:
         by_place.setdefault((e["sensor"], e["method"], e["movement"]), {})[e["quantity"]] = e
     reported: dict[str, dict[str, dict[str, Any]]] = {}
     for (sensor, method, movement), of in by_place.items():
@@ -104,8 +104,7 @@ def _show(entries: list[dict[str, Any]], checks: list[dict[str, Any]], folder: P
         shown.add_row("as published", movement, *(_number(of[q]["paper_rms"], q) for q in _TITLES))
     console = Console()
     console.print(shown)
-    show_checks(console, checks)
-    console.print(f"Tables, summary and figures: {folder}", markup=False)
+    show_end(console, document, folder)
 
 
 def _cell(entry: dict[str, Any], quantity: str) -> str:

@@ -1,9 +1,10 @@
 """What every study does on the command line: check the installation, choose where to run, show progress."""
 
 import importlib.util
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
@@ -55,11 +56,13 @@ def shown_progress(title: str) -> Iterator[Callable[[float, float], None]]:
         yield lambda done, total: bar.update(task, completed=done, total=total)
 
 
-def show_checks(console: Console, checks: Sequence[Mapping[str, object]]) -> None:
-    """Print the paper's statements with their verdicts."""
-    for check in checks:
+def show_end(console: Console, document: Mapping[str, Any], folder: Path) -> None:
+    """Print the paper's statements with their verdicts, what the study cost and where its results are."""
+    for check in document["checks"]:
         verdict = "[green]holds[/]" if check["holds"] else "[yellow]does not hold[/]"
         console.print(f"{verdict}: ", end="")
-        console.print(str(check["name"]), markup=False, highlight=False)
+        console.print(check["name"], markup=False, highlight=False)
         console.print(f"  {check['evidence']}", markup=False, highlight=False, style="dim")
         console.print(f"  {check['explanation']}", markup=False, highlight=False, style="dim")
+    console.print(f"Processor time, interrupted runs included: {document['cpu_s'] / 60:.1f} min")
+    console.print(f"Tables, summary and figures: {folder}", markup=False)

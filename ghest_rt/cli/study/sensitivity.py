@@ -99,7 +99,7 @@ def _show(document: dict[str, Any], folder: Path) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from ghest_rt.cli.study.running import show_checks
+    from ghest_rt.cli.study.running import show_end
 
     shown = Table(
         title="Arm's RMS error at the largest amount, mean over movements; relative sensitivity S, eq. (11)",
@@ -123,8 +123,7 @@ def _show(document: dict[str, Any], folder: Path) -> None:
         shown.add_row(row["method"], row["parameter"] + place, amount, *cells)
     console = Console()
     console.print(shown)
-    show_checks(console, document["checks"])
-    console.print(f"Tables, summary and figures: {folder}", markup=False)
+    show_end(console, document, folder)
 
 
 def _number(value: float | None, scale: float) -> str:

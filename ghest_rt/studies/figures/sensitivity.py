@@ -177,7 +177,7 @@ def draw_sobol(rows: Sequence[Row], movement: str) -> Any:
     for axes, (output, title) in zip(
         panels, (("position_m", "position error"), ("orientation_deg", "orientation error")), strict=True
     ):
-        of_output = [r for r in chosen if r["output"] == output]
+        of_output = [r for r in chosen if r["output"] == output and r["ST"] is not None]
         places = range(len(of_output))
         for shift, column, color, label in ((-0.2, "S1", "#56B4E9", "first order"), (0.2, "ST", "#D55E00", "total")):
             axes.barh(

@@ -13,6 +13,7 @@ from ghest_rt.errors import BadInputError
 from ghest_rt.geometry.so3 import Array
 from ghest_rt.studies.engine.run import Executor, Progress, run_tasks
 from ghest_rt.studies.engine.store import ResultStore
+from ghest_rt.studies.engine.tables import finite
 from ghest_rt.studies.engine.task import Result, Task
 from ghest_rt.studies.movements import frames_of
 from ghest_rt.studies.sensitivity.parameters import Group, Parameter, further_parameters, paper_parameters
@@ -61,7 +62,8 @@ def run_sobol(
         progress: Told (cost done, cost of all).
 
     Returns:
-        One row per movement, output and parameter: `S1` and `ST` with the half widths of their 95 % confidence intervals.
+        One row per movement, output and parameter: `S1` and `ST` with the half widths of their 95 % confidence intervals; None
+        where the error does not vary at all.
     """
     runs = samples * (len(sobol_parameters()) + 2)
     tasks = [
@@ -114,6 +116,6 @@ def _indices(F: Array, seed: int) -> list[dict[str, object]]:
     found = sobol.analyze(_problem(), F, calc_second_order=False, seed=seed)
     columns = ("S1", "S1_conf", "ST", "ST_conf")
     return [
-        {"parameter": p.name, "group": p.group, "what": p.what, "axis": p.axis, **{c: float(found[c][k]) for c in columns}}
+        {"parameter": p.name, "group": p.group, "what": p.what, "axis": p.axis, **{c: finite(found[c][k]) for c in columns}}
         for k, p in enumerate(sobol_parameters())
     ]

@@ -7,6 +7,7 @@ from typing import Any, Literal, cast
 from ghest_rt.estimation.pipeline import Method
 from ghest_rt.studies.engine.run import Executor, Progress, run_tasks, spent_cpu_s
 from ghest_rt.studies.engine.store import ResultStore
+from ghest_rt.studies.engine.tables import finite
 from ghest_rt.studies.engine.task import Task
 from ghest_rt.studies.movements import METHODS, Movements, frames_of
 from ghest_rt.studies.paper_values import STEP_M, STEPS
@@ -134,4 +135,4 @@ def _add_sensitivities(rows: Sequence[Row]) -> None:
             F = [cast(float, row[f"{quantity}_rms"]) for row in curve]
             if None not in F:
                 for row, S in zip(curve, eq11_relative_sensitivity(q, F).tolist(), strict=True):
-                    row[column] = S
+                    row[column] = finite(S)
