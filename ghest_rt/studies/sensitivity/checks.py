@@ -54,8 +54,9 @@ def _absolute(rows: Sequence[Row], amount: float, column: str, stronger: str) ->
         why = "What differs between them is the method's own error, a millimetre at most, which adds or cancels."
     else:
         why = (
-            "But m1's x and z axes are always exactly across the arm, while m0's axes are fixed to the shoulder and lie partly "
-            "along an arm that moves: the worst axis is one of m1's, the mean of the axes differs little."
+            "m1's x and z axes are always exactly across the arm, while m0's are fixed to the shoulder, so that an arm that "
+            "moves is never across one of them all the time: by geometry the worst axis is one of m1's, by a few hundredths of "
+            "a degree up to tenths, as method refined shows. The method's own error, more than half a degree, can hide that."
         )
     section = "4.3.1" if what == "position" else "4.3.2"
     name = f"Translations of {stronger} make larger errors of the arm's {what} than those of {weaker} (section {section})"
