@@ -97,6 +97,7 @@ def _rows(scenario: Scenario, result: Mapping[str, object]) -> list[Row]:
             **found[key],
             "duration_s": result["duration_s"],
             "girdle_turn_deg": result["girdle_turn_deg"],
+            "hold_forecast_deg": result["hold_forecast_deg"],
             "straight_forecast_deg": result["straight_forecast_deg"],
         }
         for key in CONTENDERS
@@ -132,7 +133,7 @@ def _verdicts(rows: Sequence[Row]) -> list[Row]:
         there = [row for row in rows if (row["sensor"], row["movement"]) == (sensor, movement)]
         figures = {key: _mean([row for row in there if row["contender"] == key]) for key in CONTENDERS}
         lag_ms = {str(row["contender"]): float(cast(float, row["lag_ms"])) for row in there}
-        straight_deg = mean_of(there, "straight_forecast_deg")
+        simple_deg = min(mean_of(there, "hold_forecast_deg"), mean_of(there, "straight_forecast_deg"))
         for key, who in CONTENDERS.items():
             if key != "fused":
                 said = verdict(
@@ -140,7 +141,7 @@ def _verdicts(rows: Sequence[Row]) -> list[Row]:
                     cast(dict[str, float], figures[key]),
                     cast(dict[str, float], figures["fused"]),
                     lag_ms[key],
-                    straight_deg,
+                    simple_deg,
                 )
                 verdicts.append({"sensor": sensor, "movement": movement, "contender": key, **asdict(said)})
     return verdicts

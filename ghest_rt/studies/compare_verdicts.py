@@ -34,7 +34,7 @@ class Verdict:
 
 
 def verdict(
-    who: Contender, theirs: Mapping[str, float], fused: Mapping[str, float], lag_ms: float, straight_forecast_deg: float
+    who: Contender, theirs: Mapping[str, float], fused: Mapping[str, float], lag_ms: float, simple_forecast_deg: float
 ) -> Verdict:
     """Return the outcome of a row.
 
@@ -43,7 +43,7 @@ def verdict(
         theirs: Its RMS errors by quantity, degrees; NaN where nothing was judged.
         fused: Those of `fused`.
         lag_ms: How long after an instant the contender's answer is published.
-        straight_forecast_deg: How far the arm departs from its own straight course between two images.
+        simple_forecast_deg: How far off the better of two simple forecasts is, one image ahead of the exact truth.
     """
     if math.isnan(theirs["orientation_deg"]):
         return Verdict(True, True, (), f"fused wins: {who.title} has no answer at all")
@@ -59,13 +59,24 @@ def verdict(
             f"{_deg(fused['published_deg'])} against {_deg(theirs['published_deg'])}"
         )
         return Verdict(False, True, lost, f"judged at its own instant {who.title} is nearer ({where}), {late}")
-    jerky = (
-        f"; the movement itself departs by {_deg(straight_forecast_deg)} from a straight course between two images, which "
-        "fused has to foresee"
-        if straight_forecast_deg > 0.5 * fused["orientation_deg"]
-        else ""
+    return Verdict(
+        False,
+        published,
+        lost,
+        f"fused does not win ({where}); {who.title} has on its side: {who.strength}"
+        f"{_unforeseen(fused['orientation_deg'], simple_forecast_deg)}",
     )
-    return Verdict(False, published, lost, f"fused does not win ({where}); {who.title} has on its side: {who.strength}{jerky}")
+
+
+def _unforeseen(fused_deg: float, simple_forecast_deg: float) -> str:
+    """Say what there was to foresee, where it is much of the error of `fused`."""
+    if simple_forecast_deg < 0.25 * fused_deg:
+        return ""
+    told = (
+        f"; fused has to foresee the movement from one image to the next, and this one is jerky: forecast simply from the exact "
+        f"truth one image ago it is missed by {_deg(simple_forecast_deg)}"
+    )
+    return told + (", which the forecast of fused does not reach" if fused_deg > 1.25 * simple_forecast_deg else "")
 
 
 def _deg(value: float) -> str:

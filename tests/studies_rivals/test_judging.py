@@ -17,7 +17,7 @@ from ghest_rt.studies.rivals.angle_errors import (
     error_columns,
     error_statistics,
     girdle_turn_deg,
-    straight_forecast_deg,
+    simple_forecasts_deg,
     truth_track,
 )
 from ghest_rt.studies.rivals.contenders import CONTENDERS
@@ -86,9 +86,13 @@ def test_the_girdles_turn_is_what_lies_between_trunk_and_gh_joint() -> None:
 def test_a_steady_turn_is_foreseen_by_going_straight_on_and_a_jerk_is_not() -> None:
     instants = [k * STEP_NS for k in range(4, 25)]
     steady = truth_of(lambda t: rot_y(2.0 * t))
-    assert straight_forecast_deg(steady, instants, STEP_NS) == pytest.approx(0.0, abs=1e-6)
+    found = simple_forecasts_deg(steady, instants, STEP_NS)
+    assert found["straight_forecast_deg"] == pytest.approx(0.0, abs=1e-6)
+    assert found["hold_forecast_deg"] == pytest.approx(math.degrees(2.0 * 0.01))
     jerk = truth_of(lambda t: rot_y(0.5 * 40.0 * t * t))  # 40 rad/s^2: a t^2 each step
-    assert straight_forecast_deg(jerk, instants, STEP_NS) == pytest.approx(math.degrees(40.0 * 0.01**2), rel=1e-6)
+    assert simple_forecasts_deg(jerk, instants, STEP_NS)["straight_forecast_deg"] == pytest.approx(
+        math.degrees(40.0 * 0.01**2), rel=1e-6
+    )
 
 
 FUSED = {"orientation_deg": 0.1, "published_deg": 0.1, "flexion_deg": 0.05, "abduction_deg": 0.05, "rotation_deg": 0.05}
@@ -119,7 +123,9 @@ def test_a_row_that_is_lost_names_what_the_other_has_on_its_side() -> None:
     assert not said.fused_wins
     assert not said.fused_wins_when_published
     assert who.strength in said.verdict
-    assert "departs by 0.200 deg" in said.verdict
+    assert "missed by 0.200 deg" in said.verdict
+    assert "does not reach" not in said.verdict
+    assert "does not reach" in verdict(who, BETTER, FUSED, 15.0, 0.05).verdict
 
 
 def test_who_never_answers_has_lost() -> None:

@@ -79,17 +79,17 @@ def _table(summary: Row, sensor: str, kind: str) -> Table:
                 Cell(who["published_short"], "published"),
             )
         )
-    turned, unforeseen = (
+    turned, held, straight = (
         ", ".join(f"{name} {number(deg)}°" for name, deg in _movements(summary, sensor, kind, column).items())
-        for column in ("girdle_turn_deg", "straight_forecast_deg")
+        for column in ("girdle_turn_deg", "hold_forecast_deg", "straight_forecast_deg")
     )
     return Table(
         title=f"Mean over {_KINDS[kind]}, sensor {sensor}: errors (°)",
         head=("contender", *(title for _, title in _COLUMNS), "fused wins", "… when published", "its own publication"),
         rows=tuple(rows),
         note=(
-            f"The scapula turned by (RMS against the neutral posture, unseen by any encoder): {turned}. Between two images the "
-            f"arm departed from a straight course by (RMS): {unforeseen}."
+            f"The scapula turned by (RMS against the neutral posture, unseen by any encoder): {turned}. How much there is to "
+            f"foresee: keeping the exact truth of one image ago is off by {held}; continuing it straight by {straight} (RMS)."
         ),
     )
 

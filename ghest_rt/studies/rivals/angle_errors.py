@@ -79,18 +79,20 @@ def girdle_turn_deg(truth: Sequence[TruthSample]) -> float:
     return _rms(np.array(turns))
 
 
-def straight_forecast_deg(truth: TruthTrack, instants_ns: Sequence[int], period_ns: int) -> float:
-    """Return the error of going straight on: the true rotation a period ago, continued at its true rate of the period before.
+def simple_forecasts_deg(truth: TruthTrack, instants_ns: Sequence[int], period_ns: int) -> dict[str, float]:
+    """Return how far off two simple forecasts are that know the truth exactly, but only up to one image ago; RMS.
 
-    RMS over the instants. It tells how much of a movement cannot be foreseen between one image and the next, whoever forecasts.
+    They tell how much of a movement can be foreseen from one image to the next: `hold_forecast_deg` keeps the rotation of a
+    period ago, `straight_forecast_deg` continues it at its mean rate of the period before.
     """
-    errors = []
+    held, straight = [], []
     for t_ns in instants_ns:
         now, newest, before = (truth.at(t_ns - k * period_ns) for k in range(3))
         if now is not None and newest is not None and before is not None:
-            straight = newest.gh_from_arm @ before.gh_from_arm.T @ newest.gh_from_arm
-            errors.append(math.degrees(angle_between_rad(now.gh_from_arm, straight)))
-    return _rms(np.array(errors, dtype=np.float64))
+            on = newest.gh_from_arm @ before.gh_from_arm.T @ newest.gh_from_arm
+            held.append(math.degrees(angle_between_rad(now.gh_from_arm, newest.gh_from_arm)))
+            straight.append(math.degrees(angle_between_rad(now.gh_from_arm, on)))
+    return {"hold_forecast_deg": _rms(np.array(held)), "straight_forecast_deg": _rms(np.array(straight))}
 
 
 def _errors(rotation: Array | None, at: TruthSample | None, published: TruthSample | None) -> list[float]:

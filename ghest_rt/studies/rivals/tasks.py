@@ -13,7 +13,7 @@ from ghest_rt.messages.results import MarkerObservation
 from ghest_rt.simulation.command import SimulateOptions, build_world
 from ghest_rt.simulation.world import World
 from ghest_rt.studies.engine.task import Result, Task
-from ghest_rt.studies.rivals.angle_errors import Answers, error_statistics, girdle_turn_deg, straight_forecast_deg, truth_track
+from ghest_rt.studies.rivals.angle_errors import Answers, error_statistics, girdle_turn_deg, simple_forecasts_deg, truth_track
 from ghest_rt.studies.rivals.running import inertial_after_rest_deg, run_without_cameras
 from ghest_rt.studies.session.estimating import estimate_session
 from ghest_rt.studies.session.observed import Observed, observe
@@ -70,7 +70,7 @@ def compare_session(parameters: dict[str, object], needs: Sequence[Result]) -> R
         {
             "duration_s": (instants_ns[-1] - instants_ns[0]) * 1e-9 if len(instants_ns) else 0.0,
             "girdle_turn_deg": girdle_turn_deg(session.truth),
-            "straight_forecast_deg": straight_forecast_deg(truth, instants_ns, period_ns),
+            **simple_forecasts_deg(truth, instants_ns, period_ns),
             "inertial_after_rest_deg": inertial_after_rest_deg(session, scenario.seed),
             "contenders": {
                 key: {**error_statistics(said, truth), "lag_ms": said.lag_ns * 1e-6} for key, said in answers.items()
