@@ -73,8 +73,8 @@ def _unforeseen(fused_deg: float, simple_forecast_deg: float) -> str:
     if simple_forecast_deg < 0.25 * fused_deg:
         return ""
     told = (
-        f"; fused has to foresee the movement from one image to the next, and this one is jerky: forecast simply from the exact "
-        f"truth one image ago it is missed by {_deg(simple_forecast_deg)}"
+        f"; fused has to foresee the movement from one image to the next, and this one is jerky: forecast simply from "
+        f"the exact truth one image ago it is missed by {_deg(simple_forecast_deg)}"
     )
     return told + (", which the forecast of fused does not reach" if fused_deg > 1.25 * simple_forecast_deg else "")
 
