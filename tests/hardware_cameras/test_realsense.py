@@ -274,6 +274,14 @@ def test_a_mode_the_camera_lacks_is_refused_with_those_it_has() -> None:
         _ = rig.camera.info
 
 
+def test_stamps_do_not_come_from_the_wall_clock() -> None:
+    options = {"global_time_enabled": (0.0, 1.0, 1.0)}
+    rig = Rig(color_options=options, depth_options=options)
+    rig.camera.open()
+    assert rig.device.option("global_time_enabled") == (0.0, 0.0)
+    rig.camera.close()
+
+
 def test_options_are_set_in_the_devices_units() -> None:
     options = {"enable_auto_exposure": (0.0, 1.0, 1.0), "exposure": (1.0, 10000.0, 100.0), "gain": (0.0, 128.0, 64.0)}
     settings = replace(SETTINGS, exposure_us=8000, laser_power=12, color_options={"gain": 40.0})

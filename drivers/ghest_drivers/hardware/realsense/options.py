@@ -25,6 +25,9 @@ def apply_options(color_sensor: Any, depth_sensor: Any, settings: RealsenseSetti
         DriverError: Something is asked for of depth that is not streamed; the sensor lacks an option, or the value is out of
             its range; says which values it takes.
     """
+    for sensor in (color_sensor, depth_sensor):
+        if sensor is not None:
+            _stamp_by_the_device(sensor)
     if depth_sensor is None:
         if settings.preset is not None or settings.laser_power is not None or settings.depth_options:
             raise DriverError("preset, laser_power and depth_options need depth: leave them out, or stream depth")
@@ -38,6 +41,15 @@ def apply_options(color_sensor: Any, depth_sensor: Any, settings: RealsenseSetti
         _set(depth_sensor, "laser_power", settings.laser_power)
     _set_all(color_sensor, settings.color_options)
     _set_all(depth_sensor, settings.depth_options)
+
+
+def _stamp_by_the_device(sensor: Any) -> None:
+    """Turn the SDK's `global time` off, its mapping of stamps to the wall clock: that goes astray when NTP steps the clock."""
+    if sensor.supports(rs.option.global_time_enabled):
+        try:
+            sensor.set_option(rs.option.global_time_enabled, 0.0)
+        except RuntimeError as error:
+            _log.warning("%s keeps stamping by the wall clock: %s", _name(sensor), error)
 
 
 def exposure_unit_us(sensor: Any) -> int:
