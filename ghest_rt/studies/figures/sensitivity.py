@@ -117,7 +117,7 @@ def draw_drift_by_method(rows: Sequence[Row]) -> Any:
         axes.set_ylabel(label)
         axes.set_ylim(bottom=0.0)
     panels[0].plot(
-        20.0, MEAN_RMSE_20_MM_DEG, marker="*", markersize=11, color="black", linestyle="none", label="the paper's 3.6°"
+        20.0, MEAN_RMSE_20_MM_DEG, marker="*", markersize=11, color="black", linestyle="none", label="published, 3.6°"
     )
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=len(labels), frameon=False)
