@@ -114,6 +114,28 @@ def access_control(access: AccessList, gateway: bool = False) -> dict[str, Any]:
     }
 
 
+def only_this_side_publishes() -> dict[str, Any]:
+    """Return Zenoh's `access_control` for a station on its own machine, where nobody has an identity.
+
+    Whoever is connected may subscribe and ask. Nobody may publish, answer or claim to be alive in the station's place: Zenoh
+    would pass it on to the other programs connected here, and by the gateway to the network.
+    """
+    forging = {
+        "id": "forge",
+        "permission": "deny",
+        "flows": ["ingress"],
+        "messages": ["put", "delete", "reply", "declare_queryable", "liveliness_token"],
+        "key_exprs": ["**"],
+    }
+    return {
+        "enabled": True,
+        "default_permission": "allow",
+        "rules": [forging],
+        "subjects": [{"id": "everybody"}],
+        "policies": [{"subjects": ["everybody"], "rules": ["forge"]}],
+    }
+
+
 def access_to_json(access: AccessList) -> bytes:
     """Return an access list as the text of its file."""
     return (json.dumps(access.model_dump(mode="json"), indent=2) + "\n").encode()

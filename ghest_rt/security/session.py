@@ -12,7 +12,7 @@ from typing import Any, Literal
 import zenoh
 
 from ghest_rt.errors import BadInputError, GhestError
-from ghest_rt.security.access import ASKED_KEYS, access_control
+from ghest_rt.security.access import ASKED_KEYS, access_control, only_this_side_publishes
 from ghest_rt.security.endpoints import split_endpoint, stays_here
 from ghest_rt.security.handshake import try_handshake
 from ghest_rt.security.identity import Identity
@@ -23,7 +23,7 @@ Mode = Literal["peer", "client", "router"]
 _SOURCE_PLACE = re.compile(r" at \S+?\.rs:\d+\.?")
 _RETRY = {"period_init_ms": 100, "period_max_ms": 500, "period_increase_factor": 2}  # of lost connections; Zenoh's own: 1-4 s
 _MAX_MESSAGE_BYTES = 1_000_000  # Zenoh's default lets a peer make us collect 1 GB
-_MAX_SESSIONS = 64
+MAX_SESSIONS = 64
 _MAX_PENDING = 16
 _OPEN_TIMEOUT_MS = 5_000
 _ASKED_MOST_HZ = 200.0  # each answer takes the interpreter's lock, which the loop needs, too
@@ -116,9 +116,10 @@ def session_settings(
         "scouting/multicast/enabled": False,
         "scouting/gossip/enabled": False,
         "transport/link/rx/max_message_size": _MAX_MESSAGE_BYTES,
-        "transport/unicast/max_sessions": _MAX_SESSIONS,
+        "transport/unicast/max_sessions": MAX_SESSIONS,
         "transport/unicast/accept_pending": _MAX_PENDING,
         "transport/unicast/accept_timeout": _OPEN_TIMEOUT_MS,
+        **({"access_control": only_this_side_publishes()} if listen and mode == "peer" else {}),
         **({} if identity is None else _secured(identity)),
     }
 
