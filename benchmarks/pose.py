@@ -42,10 +42,15 @@ def _tuned_aruco() -> cv2.aruco.DetectorParameters:
 
 
 def run(quick: bool) -> dict[str, Any]:
-    """Time both on every frame of a 640x480 recording; OpenCV keeps its own default threads."""
+    """Time all on every frame of a 640x480 recording, then of one of 128x128; OpenCV keeps its own default threads."""
+    small = {f"128x128: {name}": value for name, value in _timings("paper", quick).items()}
+    return {**_timings("sr300", quick), **small}
+
+
+def _timings(sensor: str, quick: bool) -> dict[str, Any]:
     duration_s = 1.0 if quick else 4.0
-    disks, disk_frames = _frames(scene("sr300", "disks", duration_s))
-    _, aruco_frames = _frames(scene("sr300", "aruco", duration_s))
+    disks, disk_frames = _frames(scene(sensor, "disks", duration_s))
+    _, aruco_frames = _frames(scene(sensor, "aruco", duration_s))
     config = disks.station.config
     results: dict[str, Any] = {"frames": len(disk_frames)}
 
@@ -64,6 +69,8 @@ def run(quick: bool) -> dict[str, Any]:
         cold[frame.info.name].detect(frame)
 
     results["refined, whole frame every time"] = summary_ms(_time_each(disk_frames, from_scratch))
+    aligned = detectors("photometric")
+    results["photometric, tracking"] = summary_ms(_time_each(disk_frames, lambda f: aligned[f.info.name].detect(f)))
     rival = detectors("aruco")
     results["ArUco, default parameters"] = summary_ms(_time_each(aruco_frames, lambda f: rival[f.info.name].detect(f)))
     tuned = detectors("aruco")
@@ -71,7 +78,7 @@ def run(quick: bool) -> dict[str, Any]:
         detector.set_parameters(_tuned_aruco())
     results["ArUco, tuned"] = summary_ms(_time_each(aruco_frames, lambda f: tuned[f.info.name].detect(f)))
     default_ms = results["ArUco, default parameters"]["median_ms"]
-    for name in ("refined, tracking", "refined, whole frame every time"):
+    for name in ("refined, tracking", "photometric, tracking", "refined, whole frame every time"):
         results[f"ratio: ArUco default / {name}"] = round(default_ms / results[name]["median_ms"], 2)
         results[f"ratio: ArUco tuned / {name}"] = round(results["ArUco, tuned"]["median_ms"] / results[name]["median_ms"], 2)
     return results
