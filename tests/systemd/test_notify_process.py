@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from ghest_rt.service.zenoh_session import open_session
+from ghest_rt.security.session import open_session
 from tests.cli.recordings import write_blank_recording
 from tests.cli.test_processes import COMMAND, free_endpoint
 from tests.systemd.manager_socket import ManagerSocket
