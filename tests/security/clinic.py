@@ -10,7 +10,6 @@ from ghest_rt.security.identity import CA_FILE
 from ghest_rt.security.roles import Role
 
 HOSTS = ("localhost", "127.0.0.1")
-SHORT_LIFE_S = 6.0
 
 
 @dataclass(frozen=True)
@@ -25,7 +24,7 @@ class Clinic:
         other_station: Of this clinic, for another host.
         revoked: Once a therapy identity.
         expired: A therapy identity, since yesterday.
-        short_lived: A therapy identity that expires `SHORT_LIFE_S` after the clinic was made.
+        short_lived: A therapy identity; `let_expire` says when it ends.
         foreign: Signed by another clinic's authority.
         lookalike: Signed by an authority of our clinic's name, made by somebody else.
     """
@@ -57,8 +56,7 @@ def make_clinic(root: Path, name: str = "Clinic A") -> Clinic:
     router = authority.issue(Role.ROUTER, "hall", HOSTS, 365)
     revoked = authority.issue(Role.THERAPY, "stolen", (), 365)
     authority.revoke("therapy.stolen")
-    yesterday = Authority(root / "pki", now - timedelta(days=1) + timedelta(seconds=SHORT_LIFE_S))
-    short_lived = yesterday.issue(Role.THERAPY, "short", (), 1)
+    short_lived = authority.issue(Role.THERAPY, "short", (), 1)
     return Clinic(
         station=station,
         therapy=therapy,
@@ -71,6 +69,12 @@ def make_clinic(root: Path, name: str = "Clinic A") -> Clinic:
         foreign=_outsider(root / "foreign", "Clinic B", station),
         lookalike=_outsider(root / "lookalike", name, station),
     )
+
+
+def let_expire(clinic: Clinic, seconds: float) -> None:
+    """Renew the short-lived identity so that it expires after so many seconds."""
+    yesterday = datetime.now(UTC) - timedelta(days=1) + timedelta(seconds=seconds)
+    Authority(clinic.short_lived.parents[1], yesterday).renew("therapy.short", 1)
 
 
 def _outsider(folder: Path, name: str, station: Path) -> Path:
