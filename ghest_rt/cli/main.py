@@ -300,7 +300,7 @@ def status(
         list[str] | None,
         typer.Option(
             metavar="ENDPOINT",
-            help="Where a ghest-rt, or a router, listens; repeatable [default: tcp/127.0.0.1:7447]",
+            help="Where a ghest-rt, or a router, listens (tcp/127.0.0.1:7447); repeatable",
             show_default=False,
         ),
     ] = None,
