@@ -18,8 +18,8 @@ from ghest_rt.errors import DeviceError
 from ghest_rt.messages.published import Event, Health, InputState
 from ghest_rt.messages.results import Reason, Status
 from ghest_rt.security.identity import use_identity
-from ghest_rt.service.stop_signals import StopSignals
 from ghest_rt.security.session import open_session
+from ghest_rt.service.stop_signals import StopSignals
 
 _POLL_S = 0.05
 _SILENT_AFTER_S = 3.0  # health comes once a second

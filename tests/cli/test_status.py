@@ -13,9 +13,9 @@ from rich.console import Console
 
 from ghest_rt.cli.status import StationState, page
 from ghest_rt.messages.published import Health
+from ghest_rt.security.session import open_session
 from ghest_rt.service.health import HealthMeter, SampleCounts
 from ghest_rt.service.pacing import Pacer
-from ghest_rt.security.session import open_session
 from tests.cli.conftest import Run
 from tests.cli.test_processes import COMMAND, free_endpoint
 

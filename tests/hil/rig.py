@@ -19,8 +19,7 @@ from typing import Any
 import zenoh
 
 from ghest_rt.config.shipped import shipped_config_dir
-from ghest_rt.security.session import Mode
-from ghest_rt.security.session import open_session
+from ghest_rt.security.session import Mode, open_session
 from tests.hardware_encoders.can_senders import ARMEO_SOURCES
 from tests.hil.injection import FOLDER_VARIABLE, Window, inject
 from tests.hil.scene import FRAME_RATE_HZ, STATION_FILE, Scene, read_scene, write_scene

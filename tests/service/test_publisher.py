@@ -17,9 +17,9 @@ from ghest_rt.config.station import StationConfig
 from ghest_rt.errors import BadInputError, GhestError
 from ghest_rt.messages.published import json_schemas
 from ghest_rt.messages.results import GhEstimate, Reason, Status
+from ghest_rt.security.session import open_session
 from ghest_rt.service.compose import AnglesComposer, Numbering
 from ghest_rt.service.publisher import ZenohPublisher
-from ghest_rt.security.session import open_session
 
 SAMPLES = 2000
 
