@@ -3,16 +3,20 @@
 import hashlib
 import pickle
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import Path
 
 from benchmarks.scenes import FOLDER
 from ghest_drivers.samples import CameraInfo, EncoderSample
-from ghest_rt.config.load import LoadedStation
+from ghest_rt.config.load import LoadedStation, load_station
+from ghest_rt.config.shipped import shipped_config_dir
 from ghest_rt.estimation.interface import GhEstimator
 from ghest_rt.estimation.pipeline import Method, Pipeline
 from ghest_rt.messages.results import GhEstimate, MarkerObservation
+from ghest_rt.simulation.anatomy import anatomy
 from ghest_rt.simulation.command import SimulateOptions, build_world
 from ghest_rt.simulation.faults import FaultyDevices
+from ghest_rt.simulation.fitting import fit_station
 from ghest_rt.studies.truth import TruthTrack
 from ghest_rt.sync.grid import Grid
 
@@ -46,17 +50,27 @@ class Session:
 
 def observed(options: SimulateOptions, vision: Method) -> Session:
     """Return a session as the detectors of method `vision` see it; `options.out` does not matter."""
-    key = hashlib.sha256(repr((options, vision)).encode()).hexdigest()[:16]
+    station = fit_station(load_station(options.station or shipped_station(options)), anatomy(options.height_m))
+    calibration = station.config.calibration
+    geometry = (station.urdf_text, calibration.link_from_camera, calibration.m0_from_gh, calibration.m1_from_elw)
+    key = hashlib.sha256(repr((options, vision, geometry)).encode()).hexdigest()[:16]
     path = FOLDER / "observed" / f"{key}.pickle"
     if path.exists():
         found: Session = pickle.loads(path.read_bytes())
-        return found
+        # What does not change the images may have changed in the station file since.
+        return replace(found, station=station)
     session = _observe(options, vision)
     path.parent.mkdir(parents=True, exist_ok=True)
     part = path.with_suffix(".part")
     part.write_bytes(pickle.dumps(session))
     part.replace(path)
     return session
+
+
+def shipped_station(options: SimulateOptions) -> Path:
+    """Return the station file that ships for a sensor and an arm."""
+    sensor = "" if options.sensor == "paper" else f"{options.sensor}-"
+    return shipped_config_dir() / f"station-{sensor}sim{'-left' if options.arm == 'left' else ''}.toml"
 
 
 def _observe(options: SimulateOptions, vision: Method) -> Session:

@@ -109,8 +109,10 @@ def pose(angles: Callable[[float], tuple[float, float, float]], t_ns: int) -> Po
     e_from_elw = transform(R @ _ARM_FROM_ELW, p_elw)
     # The forearm module: turned with the arm but for most of its flexion; its pivot is not centred on the elbow.
     l8 = R @ rot_y(-0.8 * a) @ rot_z(0.05 * g + 0.05 * a)
-    yaw, pitch, roll = _yxz(l8)
     p_l8 = p_elw + R @ np.array([-0.012, 0.004, 0.010]) - l8 @ np.array([0.0, -0.11, 0.0])
+    # Its axes are such that its joints are far from their singularity where the arm's angles are at theirs.
+    l8 = l8 @ rot_y(math.pi / 2)
+    yaw, pitch, roll = _yxz(l8)
     joints = np.array([*p_l8, yaw, pitch, roll])
     return Pose(gh, e_from_gh @ inverse(M0_FROM_GH), e_from_elw @ inverse(M1_FROM_ELW), transform(l8, p_l8), joints)
 

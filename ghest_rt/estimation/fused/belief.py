@@ -78,6 +78,7 @@ class Belief:
         surprise: Of m0 and m1: (3,) the last innovation of the rotation, whitened.
         strain: Of m0 and m1: (3,) the last innovation of the GH centre's place, whitened.
         slack: Factor on the creep of the GH centre in the markers.
+        nis: Normalised innovation squared of the last sighting, as foretold (6 degrees of freedom).
         streaks: Outliers in a row of m0 and m1.
         base: How m0 and m1 sit on their bones, jumps included.
     """
@@ -95,6 +96,7 @@ class Belief:
     surprise: tuple[Array, Array] = field(default_factory=lambda: (np.zeros(3), np.zeros(3)))
     strain: tuple[Array, Array] = field(default_factory=lambda: (np.zeros(3), np.zeros(3)))
     slack: float = 1.0
+    nis: float = 0.0
     streaks: tuple[Streak, Streak] = field(default_factory=lambda: (Streak(), Streak()))
     base: tuple[Base, Base] = field(default_factory=lambda: (Base(), Base()))
 
@@ -114,6 +116,7 @@ class Belief:
             self.surprise,
             self.strain,
             self.slack,
+            self.nis,
             self.streaks,
             self.base,
         )

@@ -28,10 +28,12 @@ _REGULAR = np.diag(np.repeat((0.0, 1e-14), (6, 3)))
 # Variance of an elbow's place that is not known, m^2.
 _ANYWHERE_M2 = 1e2
 _ELBOW = slice(15 * (_KNOWN + 1), None, _KNOWN + 1)
+_FROM_POSES = np.eye(_POSTURE + DRIFT_SIZE, _KNOWN)
+_FROM_DRIFT = np.eye(_POSTURE + DRIFT_SIZE, DRIFT_SIZE, -_POSTURE)
 # An answer this unlikely is left out.
 _NEGLIGIBLE = 2e-2
 # The answers are weighed this often.
-_WEIGH_NS = 100_000_000
+_WEIGH_NS = 150_000_000
 # The arm length is taken anew into the geometry when it has changed by this much.
 _LENGTH_STEP_M = 0.004
 
@@ -79,7 +81,7 @@ class DriftJudge:
         self._since = kinds == _SINCE
         self._ever = (kinds[:, 2:] == _EVER).any(axis=1)
         self._came = self._since.any(axis=1)
-        self._cost = self._moved @ np.array([tuning.slide_cost, tuning.turn_cost] * 2)
+        self._cost = self._moved @ np.array([tuning.slide_cost, tuning.turn_cost[0], tuning.slide_cost, tuning.turn_cost[1]])
         length = tuning.unknown_arm_length_m if arm_length_m is None else tuning.arm_length_m
         slides = [np.array(tuning.slide_m) ** 2, np.full(2, tuning.calibrated_m**2), np.full(2, tuning.exact_m**2)]
         turns = [np.array(tuning.turn_rad) ** 2, np.full(2, tuning.calibrated_rad**2), np.full(2, tuning.exact_rad**2)]
@@ -109,8 +111,8 @@ class DriftJudge:
         found = np.zeros(9)
         found[:3], found[3:6] = belief.gh_in_marker
         found[:6] -= explained.expected
-        P = np.zeros((_KNOWN, _KNOWN))
-        P[:15, :15] = belief.P[:15, :15]
+        P = belief.P[:_KNOWN, :_KNOWN].copy()
+        P[15:], P[:, 15:] = 0.0, 0.0
         P.ravel()[_ELBOW] = _ANYWHERE_M2 if elbow_moved is None else self._elbow_m2
         if elbow_moved is not None:
             found[6:] = elbow_moved
@@ -199,10 +201,8 @@ class DriftJudge:
         W = explained.W[h]
         m0, m1 = belief.e_from_marker
         # Errors of the posture from those of the poses and of the GH centre in the markers, and from what W leaves open.
-        B, M = np.zeros((_POSTURE + DRIFT_SIZE, _KNOWN)), np.zeros((_POSTURE + DRIFT_SIZE, DRIFT_SIZE))
-        B[POSES, POSES] = np.eye(9)
+        B, M = _FROM_POSES.copy(), _FROM_DRIFT.copy()
         M[ACROMION, TURN[0]], M[ARM, TURN[1]] = -m0, -m1
-        M[_POSTURE:] = np.eye(DRIFT_SIZE)
         B[:, 9:] = M @ W
         drift = W @ (found + shift[9:])
         mean = M @ drift

@@ -9,35 +9,40 @@ from ghest_drivers.samples import EncoderSample
 from ghest_rt.estimation.arm import eq10_m0_from_arm, gh_from_arm_rotation, step3_4_5_e_from_arm
 from ghest_rt.estimation.arm_chain import CAMERAS, ArmChain, lost
 from ghest_rt.estimation.fused.axial import AxialJudge, twist_rad
-from ghest_rt.estimation.fused.belief import ACROMION, ARM, SIZE, Belief
-from ghest_rt.estimation.fused.drift import DRIFT_SIZE, SLIDE, TURN, DriftJudge, Posture
+from ghest_rt.estimation.fused.belief import ARM, SIZE, Belief
+from ghest_rt.estimation.fused.drift import DriftJudge
 from ghest_rt.estimation.fused.filter import FusedFilter
 from ghest_rt.estimation.fused.joints import JointForecast, Joints
 from ghest_rt.estimation.fused.process import Process
+from ghest_rt.estimation.fused.report import drift_report, rotation_covariance
 from ghest_rt.estimation.fused.settled import Settled
 from ghest_rt.estimation.fused.sighting import Sighting
 from ghest_rt.estimation.fused.timeline import Timeline
 from ghest_rt.estimation.fused.tuning import Tuning
 from ghest_rt.estimation.inputs import NO_FRAMES, NOT_SEEN, Inputs
 from ghest_rt.estimation.reasons import gravest
-from ghest_rt.estimation.uncertainty import covariance_in_e, euler_sigma_rad
+from ghest_rt.estimation.uncertainty import euler_sigma_rad
 from ghest_rt.geometry.se3 import inverse
 from ghest_rt.geometry.so3 import Array, log_so3, rot_z
-from ghest_rt.messages.results import DriftReport, GhEstimate, MarkerDrift, MarkerObservation, MarkerStatus, Reason, Status
+from ghest_rt.messages.results import GhEstimate, MarkerObservation, MarkerStatus, Reason, Status
 from ghest_rt.sync.encoder_track import EncoderTrack
 
 # Both markers must have been seen within this time for the filter to start.
 _START_NS = 100_000_000
 # Encoder samples farther apart than this are a gap: no known link is slower than 40 Hz.
 _ENCODER_BRIDGE_NS = 40_000_000
-# A camera's latency is followed by a tenth per frame.
-_FOLLOW = 0.1
+# A camera's latency is followed by a tenth per frame downwards, by a hundredth upwards: a busy machine holds frames up for a while.
+_FOLLOW, _FOLLOW_UP = 0.1, 0.01
 # Nothing is bridged for longer, however certain it looks.
 _LONGEST_BRIDGE_NS = 3_000_000_000
-# A marker has drifted if that is likelier than not.
-_FLAG = 0.5
+# A drift is compensated when the markers no longer contradict each other, and the rotation's standard deviation is below this
+# share of the station's limit.
+_SETTLED_SLACK = 10.0
+_UNSETTLED = 0.2
 # Frames come this much later than usual now and then.
 _JITTER_NS = 8_000_000
+# Elbow and forearm are compared with m1 this often: their disagreement is slow.
+_COMPARE_NS = 40_000_000
 # By how much a joint is moved to see how far it carries camera r1, rad or m.
 _SMALL_STEP = 1e-4
 _ARM_DIAGONAL = slice(ARM.start * (SIZE + 1), ARM.stop * (SIZE + 1), SIZE + 1)
@@ -72,6 +77,8 @@ class FusedEstimator:
         self._judge = DriftJudge(self._tuning, chain.m0_from_gh, chain.m1_from_elw, arm_length_m)
         self._axial = AxialJudge(self._tuning)
         self._elbow = Settled(3, self._tuning.reference_s, self._tuning.elbow_memory_s)
+        self._unsettled_rad = _UNSETTLED * chain.sigma_limit_rad
+        self._compared_ns = 0
         self._carried: Array | None = None
         self._inputs = Inputs(EncoderTrack(chain.limits), CAMERAS, max_gap_ns)
         self._joints = JointForecast(self._inputs.encoders, max_gap_ns)
@@ -95,7 +102,8 @@ class FusedEstimator:
         which = CAMERAS.index(observation.camera)
         latency_ns = observation.t_arrival_ns - observation.t_capture_ns
         known = self._latency_ns[which]
-        self._latency_ns[which] = known + _FOLLOW * (latency_ns - known) if self._last[which] else float(latency_ns)
+        follow = _FOLLOW_UP if latency_ns > known else _FOLLOW
+        self._latency_ns[which] = known + follow * (latency_ns - known) if self._last[which] else float(latency_ns)
         sighting = self._sighting(observation, which)
         if sighting is None:
             return
@@ -105,13 +113,18 @@ class FusedEstimator:
         else:
             self._timeline.add(sighting)
             belief = self._timeline.belief_at(sighting.t_ns)
-            if which and belief is not None:
+            if which and belief is not None and sighting.t_ns - self._compared_ns >= _COMPARE_NS:
+                self._compared_ns = sighting.t_ns
                 self._compare_elbow(belief, sighting)
 
     def counts(self) -> dict[str, int]:
         """Return how many samples were not used, by reason."""
         taken = {} if self._timeline is None else {reason: n for reason, n in self._timeline.counts.items() if n}
         return {**self._inputs.counts(), **taken}
+
+    def innovation(self) -> float | None:
+        """Return the normalised innovation squared (6 degrees of freedom) of the newest sighting; None before there is any."""
+        return None if self._timeline is None else self._timeline.newest.nis
 
     def estimate(self, t_ns: int) -> GhEstimate:
         """Return the GH joint at `t_ns`, forecast where nothing newer has come, or why there is none."""
@@ -124,7 +137,7 @@ class FusedEstimator:
         stale = self._stale(belief, t_ns)
         posture = self._judge.judge(belief, self._elbow_moved(belief))
         e_from_arm = step3_4_5_e_from_arm(posture.e_from_gh, posture.e_from_elw)
-        covariance = _rotation_covariance(posture)
+        covariance = rotation_covariance(posture)
         newest_ns = {**self._inputs.newest_ns, "r0": belief.seen_ns[0], "r1": belief.seen_ns[1], "encoders": joints.newest_ns}
         if e_from_arm is None or (stale and self._given_up(belief, t_ns, covariance)):
             return lost(t_ns, self._why_unseen(stale, t_ns) if stale else Reason.UNCERTAIN, newest_ns)
@@ -137,9 +150,12 @@ class FusedEstimator:
             gh_from_arm = gh_from_arm @ rot_z(slip_rad)
             e_from_arm[:3, :3] = e_from_arm[:3, :3] @ rot_z(slip_rad)
             covariance = covariance + slip_variance * np.outer(gh_from_arm[:, 2], gh_from_arm[:, 2])
-        drift = _report(posture)
+        drift = drift_report(posture, self._axial.slip, self._chain.m1_from_elw[:3, 1])
         elbow = self._chain.elbow_angles(e_from_arm, joints.positions, posture.covariance[ARM, ARM])
-        reason = self._weakness(gh_from_arm, covariance, bool(stale) or joints.gap_ns > _ENCODER_BRIDGE_NS, drift)
+        flagged = drift.m0.flagged or drift.m1.flagged
+        unsettled = belief.slack > _SETTLED_SLACK or math.sqrt(float(np.trace(covariance))) > self._unsettled_rad
+        bridged = bool(stale) or joints.gap_ns > _ENCODER_BRIDGE_NS
+        reason = self._weakness(gh_from_arm, covariance, bridged, flagged and unsettled)
         return GhEstimate(
             t_sample_ns=t_ns,
             status=Status.VALID if reason is Reason.NONE else Status.DEGRADED,
@@ -161,7 +177,9 @@ class FusedEstimator:
         e_from_r1 = self._e_from_r1(joints.positions)
         e_from_camera = e_from_r1 if which else self._chain.e_from_camera(CAMERAS[0], joints.positions)
         covariance = self._default if observation.covariance is None else observation.covariance + self._floor
-        covariance = covariance_in_e(covariance, e_from_camera)
+        turned = np.zeros((6, 6))
+        turned[:3, :3] = turned[3:, 3:] = e_from_camera[:3, :3]
+        covariance = turned @ covariance @ turned.T
         if self._chain.needs_encoders(observation.camera):
             turn, place = self._encoder_variance(joints)
             covariance[[0, 1, 2], [0, 1, 2]] += self._tuning.encoder_rad**2 + turn
@@ -174,7 +192,7 @@ class FusedEstimator:
             e_from_r1=e_from_r1,
             color_only=observation.status is MarkerStatus.COLOR_ONLY,
             fewer_disks=0 < observation.disks_used < 4,
-            forearm=self._chain.forearm_in_e(joints.positions) if which else None,
+            joints=joints.positions,
         )
 
     def _forecast(self, belief: Belief, t_ns: int, joints: Joints) -> None:
@@ -199,7 +217,7 @@ class FusedEstimator:
         base, R = belief.base[1], sighting.pose[:3, :3]
         elbow = sighting.pose[:3, 3] + R @ (base.turn.T @ (self._chain.m1_from_elw[:3, 3] - base.slide))
         self._elbow.add(sighting.t_ns, sighting.e_from_r1[:3, :3].T @ (elbow - sighting.e_from_r1[:3, 3]))
-        forearm = sighting.forearm
+        forearm = self._chain.forearm_in_e(sighting.joints)
         if forearm is None:
             return
         elw_from_e = self._chain.m1_from_elw[:3, :3].T @ base.turn @ R.T
@@ -257,9 +275,17 @@ class FusedEstimator:
         reasons = [self._inputs.why_no_pose(camera, t_ns, needs_encoders=False) for camera in missing]
         return gravest(*reasons) if reasons else Reason.STARTING
 
-    def _weakness(self, gh_from_arm: Array, covariance: Array, bridged: bool, drift: DriftReport) -> Reason:
-        """Return the gravest reason why angles that are there are not plainly valid."""
-        if max(euler_sigma_rad(gh_from_arm, covariance)) > self._chain.sigma_limit_rad:
+    def _weakness(self, gh_from_arm: Array, covariance: Array, bridged: bool, drifting: bool) -> Reason:
+        """Return the gravest reason why angles that are there are not plainly valid.
+
+        Args:
+            gh_from_arm: (3, 3) rotation.
+            covariance: (3, 3) of its error.
+            bridged: Whether an input is missing.
+            drifting: Whether a marker has drifted, and it is not yet clear by how much.
+        """
+        sigma_rad = max(euler_sigma_rad(gh_from_arm, covariance))
+        if sigma_rad > self._chain.sigma_limit_rad:
             return Reason.UNCERTAIN
         last = [sighting for sighting in self._last if sighting is not None]
         if any(sighting.color_only for sighting in last):
@@ -268,27 +294,4 @@ class FusedEstimator:
             return Reason.FEWER_DISKS
         if bridged:
             return Reason.BRIDGED
-        return Reason.MARKER_DRIFT if drift.m0.flagged or drift.m1.flagged else Reason.NONE
-
-
-def _report(posture: Posture) -> DriftReport:
-    sigma = np.sqrt(posture.covariance.diagonal()[-DRIFT_SIZE:])
-    m0, m1 = (
-        MarkerDrift(
-            flagged=posture.drifted[k] > _FLAG,
-            probability=posture.drifted[k],
-            slide_m=posture.slide[k],
-            slide_sigma_m=sigma[SLIDE[k]],
-            turn_rad=posture.turn[k],
-            turn_sigma_rad=sigma[TURN[k]],
-        )
-        for k in (0, 1)
-    )
-    return DriftReport(m0, m1)
-
-
-def _rotation_covariance(posture: Posture) -> Array:
-    """Return the (3, 3) covariance of the error of gh_from_arm: epsilon = gh_from_e (phi_humerus - phi_scapula)."""
-    P, gh_from_e = posture.covariance, posture.e_from_gh[:3, :3].T
-    cross = P[ACROMION, ARM]
-    return np.asarray(gh_from_e @ (P[ACROMION, ACROMION] + P[ARM, ARM] - cross - cross.T) @ gh_from_e.T)
+        return Reason.MARKER_DRIFT if drifting else Reason.NONE

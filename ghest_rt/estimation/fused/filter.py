@@ -98,6 +98,7 @@ class FusedFilter:
         which = sighting.marker
         innovation = innovation_of(belief, which, sighting.pose)
         foretold = _Update(belief.P, innovation, sighting.covariance)
+        belief.nis = foretold.nis
         update = self._surged(foretold, belief.P, innovation, sighting)
         outcome = Outcome.TAKEN
         if not update.nis <= self._tuning.gate:
@@ -198,6 +199,7 @@ class _Update:
         self._residual = innovation.residual
         self._without_rotation = innovation.without_rotation
         self.spread = self._H_P @ H.T + noise
+        self._place_spread = self._without_rotation @ self.spread @ self._without_rotation.T
         self._information = np.linalg.inv(self.spread)
         self.nis = float(self._residual @ self._information @ self._residual)
 
@@ -207,14 +209,13 @@ class _Update:
 
     def place_surprise(self) -> Array:
         """Return the (3,) innovation of the position, judged by the measured rotation, whitened."""
-        T = self._without_rotation
-        return whitened_3(T @ self.spread @ T.T, T @ self._residual)
+        return whitened_3(self._place_spread, self._without_rotation @ self._residual)
 
     def apply(self, belief: Belief) -> None:
         """Correct a belief."""
         T, H_P = self._without_rotation, self._H_P
         gain = (self._information @ H_P).T
-        gain[_PLACES] = ((T.T @ inverse_3(T @ self.spread @ T.T)) @ (T @ H_P)).T[_PLACES]
+        gain[_PLACES] = ((T.T @ inverse_3(self._place_spread)) @ (T @ H_P)).T[_PLACES]
         # Joseph's (1 - K H) P (1 - K H)^T + K R K^T, multiplied out, and its symmetric part.
         P = self._P + gain @ (self.spread @ gain.T - 2.0 * H_P)
         belief.P = 0.5 * (P + P.T)

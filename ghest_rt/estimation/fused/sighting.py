@@ -16,8 +16,7 @@ class Sighting:
         covariance: (6, 6) of (rotation error rad, translation error m), E axes.
         e_from_r1: (4, 4) camera r1 in E at that time, equation (6).
         color_only: Depth took no part in it.
-        forearm: (3,) direction from elbow to wrist in E at that time, by the encoders, with a sighting of m1; None with m0 and
-            where the forearm is not on the exoskeleton.
+        joints: (n,) joint positions at that time, rad (m for prismatic joints).
         fewer_disks: It rests on fewer than four disks.
     """
 
@@ -28,4 +27,4 @@ class Sighting:
     e_from_r1: Array
     color_only: bool
     fewer_disks: bool
-    forearm: Array | None = None
+    joints: Array

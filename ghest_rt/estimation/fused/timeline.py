@@ -31,6 +31,11 @@ class Timeline:
         self._entries: deque[_Entry] = deque(maxlen=_DEPTH)
         self.counts: Counter[str] = Counter()
 
+    @property
+    def newest(self) -> Belief:
+        """What is believed after the newest sighting; copy it before moving it on."""
+        return self._belief
+
     def belief_at(self, t_ns: int) -> Belief | None:
         """Return what was believed after the last sighting not later than `t_ns`; copy it before moving it on.
 

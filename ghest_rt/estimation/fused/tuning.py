@@ -48,7 +48,7 @@ class Tuning:
         exact_m: What is left of a slide where there is no drift.
         exact_rad: What is left of a turn where there is no drift.
         slide_cost: Twice the logarithm of the odds against a slide.
-        turn_cost: Twice the logarithm of the odds against a turn.
+        turn_cost: Twice the logarithm of the odds against a turn: m0, m1.
         arm_length_m: Standard deviation of a calibrated arm length.
         axial_memory_s: The disagreement of forearm and m1 about the arm is averaged over this time; faster is movement.
         reference_s: Over this time at first it is learned how forearm and m1 agree, and where the elbow is.
@@ -73,10 +73,10 @@ class Tuning:
     most_agility: float = 1e6
     bridging_agility: tuple[float, float] = (1000.0, 300.0)
     agility_gain: float = 0.15
-    agility_fall: float = 0.35
+    agility_fall: float = 0.3
     agility_rest: float = 0.2
     still_rad_s: float = 0.03
-    forecast_doubt: float = 3.0
+    forecast_doubt: float = 5.0
     rotation_floor_rad: float = math.radians(0.003)
     position_floor_m: float = 3e-6
     encoder_m: float = 3e-5
@@ -94,7 +94,7 @@ class Tuning:
     regain_count: int = 8
     creep_m2_s: tuple[float, float] = (3e-7, 3e-8)
     slack_gain: float = 1.5
-    slack_fall: float = 0.1
+    slack_fall: float = 0.35
     most_slack: float = 3e3
     unknown_gh_m: float = 0.04
     slide_m: tuple[float, float] = (0.02, 0.015)
@@ -102,9 +102,9 @@ class Tuning:
     calibrated_m: float = 1e-3
     calibrated_rad: float = math.radians(0.3)
     exact_m: float = 1e-5
-    exact_rad: float = math.radians(0.001)
+    exact_rad: float = math.radians(0.002)
     slide_cost: float = 12.0
-    turn_cost: float = 15.0
+    turn_cost: tuple[float, float] = (15.0, 13.5)
     axial_memory_s: float = 1.0
     reference_s: float = 2.0
     elbow_memory_s: float = 0.3

@@ -1,0 +1,62 @@
+"""m1 that slips about the arm, judged by the forearm."""
+
+import math
+
+import numpy as np
+
+from ghest_rt.estimation.fused.axial import AxialJudge, Slip, twist_rad
+from ghest_rt.estimation.fused.tuning import Tuning
+from ghest_rt.geometry.so3 import rot_x, rot_y, rot_z
+from tests.estimation_fused.stand import MS, START
+
+
+def shown(slip_rad: float, elbow_rad: float) -> np.ndarray:
+    """The forearm in the elbow frame as m1 shows it, when the humerus has turned by `slip_rad` more than m1 about the arm."""
+    forearm = np.array([0.02, -math.cos(elbow_rad), -math.sin(elbow_rad)])
+    return rot_y(slip_rad) @ (forearm / np.linalg.norm(forearm))
+
+
+def session(lag: float, shift_rad: float, seconds: float = 8.0, elbow_deg: float = 80.0) -> Slip:
+    """Slip found after a session of axial rotation by 20 deg to and fro, with the shift coming at 4 s."""
+    judge = AxialJudge(Tuning())
+    rng = np.random.default_rng(3)
+    for k in range(round(seconds * 25)):
+        t = k / 25.0
+        true = math.radians(20.0) * math.sin(2.0 * math.pi * 0.25 * t)
+        at_skin = (1.0 - lag) * true - (shift_rad if t > 4.0 else 0.0)
+        wander = math.radians(0.3) * rng.standard_normal()
+        judge.add(START + k * 40 * MS, shown(true - at_skin + wander, math.radians(elbow_deg)), at_skin)
+    return judge.slip
+
+
+def test_skin_that_follows_seven_tenths_of_the_rotation_is_made_up_for() -> None:
+    slip = session(0.3, 0.0)
+    at_skin = 0.7 * math.radians(20.0)
+    found, variance = slip.at(at_skin)
+    assert abs(math.degrees(found) - 6.0) < 0.5
+    assert abs(math.degrees(found) - 6.0) < 2.0 * math.degrees(math.sqrt(variance))
+    assert slip.shifted < 0.1
+
+
+def test_a_cuff_that_turns_during_the_session_is_found() -> None:
+    slip = session(0.0, math.radians(5.0))
+    assert slip.shifted > 0.9
+    assert abs(math.degrees(slip.shift_rad) - 5.0) < 0.7
+    assert slip.lag == 0.0
+
+
+def test_a_forearm_that_is_not_centred_makes_no_slip() -> None:
+    assert session(0.0, 0.0) == Slip()
+
+
+def test_a_stretched_elbow_says_nothing() -> None:
+    assert session(0.3, 0.0, elbow_deg=10.0) == Slip()
+
+
+def test_the_twist_is_that_about_the_arm() -> None:
+    swing = rot_y(0.4) @ rot_x(-0.3)
+    V = swing[:, 2]
+    axis = np.array([-V[1], V[0], 0.0]) / math.hypot(V[0], V[1])
+    assert twist_rad(rot_z(0.3)) == 0.3
+    assert abs(axis @ V) < 1.0
+    assert abs(twist_rad(rot_y(0.7))) < 1e-12
