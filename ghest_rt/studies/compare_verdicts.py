@@ -69,14 +69,11 @@ def verdict(
 
 
 def _unforeseen(fused_deg: float, simple_forecast_deg: float) -> str:
-    """Say what there was to foresee, where it is much of the error of `fused`."""
-    if simple_forecast_deg < 0.25 * fused_deg:
-        return ""
-    told = (
-        f"; fused has to foresee the movement from one image to the next, and this one is jerky: forecast simply from "
-        f"the exact truth one image ago it is missed by {_deg(simple_forecast_deg)}"
-    )
-    return told + (", which the forecast of fused does not reach" if fused_deg > 1.25 * simple_forecast_deg else "")
+    """Say how the error of `fused` compares with what there was to foresee."""
+    simple = f"a simple forecast from the exact truth one image ago is off by {_deg(simple_forecast_deg)}"
+    if fused_deg <= 1.25 * simple_forecast_deg:
+        return f"; fused has to foresee the movement from one image to the next, and this one is jerky: {simple}"
+    return f"; {simple}: the forecast of fused does not reach what this movement allows"
 
 
 def _deg(value: float) -> str:

@@ -123,7 +123,7 @@ def test_a_row_that_is_lost_names_what_the_other_has_on_its_side() -> None:
     assert not said.fused_wins
     assert not said.fused_wins_when_published
     assert who.strength in said.verdict
-    assert "missed by 0.200 deg" in said.verdict
+    assert "off by 0.200 deg" in said.verdict
     assert "does not reach" not in said.verdict
     assert "does not reach" in verdict(who, BETTER, FUSED, 15.0, 0.05).verdict
 
