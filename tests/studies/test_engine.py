@@ -8,6 +8,7 @@ from ghest_rt.errors import BadInputError, GhestError
 from ghest_rt.studies.engine.cluster import ClusterExecutor
 from ghest_rt.studies.engine.local import LocalExecutor
 from ghest_rt.studies.engine.run import run_tasks, spent_cpu_s
+from ghest_rt.studies.engine.salt import code_salt
 from ghest_rt.studies.engine.store import ResultStore
 from ghest_rt.studies.engine.task import Result, Task
 from tests.studies.study_tasks import square_task
@@ -83,6 +84,19 @@ def test_the_key_depends_on_parameters_needs_and_code_but_not_on_the_cost() -> N
     ]
     assert len({other.key(salt) for other in (task, *others)}) == 4
     assert task.key(salt) != task.key(lambda kind: f"newer code of {kind}")
+
+
+def test_a_change_of_the_code_beside_a_task_counts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "kinds").mkdir()
+    (tmp_path / "kinds" / "tasks.py").write_text("from kinds import helper\n")
+    helper = tmp_path / "kinds" / "helper.py"
+    monkeypatch.syspath_prepend(str(tmp_path))
+    salts = []
+    for text in ("one", "two", "one"):
+        helper.write_text(f"# {text}\n")
+        code_salt.cache_clear()
+        salts.append(code_salt("kinds.tasks:run"))
+    assert salts[0] == salts[2] != salts[1]
 
 
 def test_results_appear_whole_or_not_at_all(tmp_path: Path) -> None:
