@@ -31,7 +31,8 @@ from ghest_rt.sync.encoder_track import EncoderTrack
 _START_NS = 100_000_000
 # Encoder samples farther apart than this are a gap: no known link is slower than 40 Hz.
 _ENCODER_BRIDGE_NS = 40_000_000
-# A camera's latency is followed by a tenth per frame downwards, by a hundredth upwards: a busy machine holds frames up for a while.
+# A camera's latency is followed by a tenth per frame downwards, by a hundredth upwards: a busy machine holds frames up now and
+# then.
 _FOLLOW, _FOLLOW_UP = 0.1, 0.01
 # Nothing is bridged for longer, however certain it looks.
 _LONGEST_BRIDGE_NS = 3_000_000_000
