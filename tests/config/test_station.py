@@ -50,7 +50,7 @@ def test_a_good_file_loads_with_its_urdf(tmp_path: Path) -> None:
     (tmp_path / "station.toml").write_text(GOOD)
     station = load_station(tmp_path / "station.toml")
     assert station.config.station.id == "test"
-    assert station.config.estimator.method == "refined"
+    assert station.config.estimator.method == "fused"
     assert station.urdf_text == "<robot name='x'/>"
 
 

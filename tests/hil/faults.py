@@ -43,12 +43,12 @@ def _fault(name: str, devices: str, mode: str, *reasons: str, seconds: float = 1
 
 FAULTS = (
     _fault("every other frame dropped (r0)", "r0", "drops"),
-    _fault("frames in bursts of 15 (r1)", "r1", "bursts", "r1_no_frames"),
-    _fault("frozen image (r0)", "r0", "frozen", "r0_no_frames"),
-    _fault("frozen image (r1)", "r1", "frozen", "r1_no_frames"),
+    _fault("frames in bursts of 15 (r1)", "r1", "bursts", "r1_no_frames", "bridged"),
+    _fault("frozen image (r0)", "r0", "frozen", "r0_no_frames", "bridged"),
+    _fault("frozen image (r1)", "r1", "frozen", "r1_no_frames", "bridged"),
     _fault("cameras swapped", "r0 r1", "swapped", "m0_not_seen", "m1_not_seen"),
-    _fault("camera silent (r0)", "r0", "silent", "r0_no_frames", seconds=1.5),
-    _fault("camera lost and back (r1)", "r1", "unplugged", "r1_no_frames", seconds=2.0),
+    _fault("camera silent (r0)", "r0", "silent", "r0_no_frames", "bridged", seconds=1.5),
+    _fault("camera lost and back (r1)", "r1", "unplugged", "r1_no_frames", "bridged", seconds=2.0),
     _fault("both cameras lost and back", "r0 r1", "unplugged", "r0_no_frames", "r1_no_frames", seconds=2.0),
     _fault("encoders silent", "encoders", "silent", "encoders_silent", seconds=1.5),
     _fault("encoders: garbage", "encoders", "garbage", "encoders_silent"),

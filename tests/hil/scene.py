@@ -1,10 +1,13 @@
 """One simulated scene that feeds all fixtures: images, joint angles and truth on one time axis, for ever to and fro.
 
-World time s runs 0 .. D and back again; it is a function of the host's monotonic clock alone, so every process that knows the
-epoch knows what cameras see, what encoders read and what is true at any instant, without talking to the others.
+World time s runs 0 .. D and back again, the movement with it, but slowing down to a stop before each turn: no arm turns round
+in an instant, and a forecast of one that did would be wrong. World time is a function of the host's monotonic clock alone, so
+every process that knows the epoch knows what cameras see, what encoders read and what is true at any instant, without talking
+to the others.
 """
 
 import json
+import math
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -71,6 +74,11 @@ class Scene:
         return float(np.degrees((truth.inv() * Rotation.from_quat([x, y, z, w])).magnitude()))
 
 
+def movement_s(world_s: float) -> float:
+    """Time of the movement at a world time: at rest at both ends, never faster than the movement itself."""
+    return DURATION_S / math.pi * (1.0 - math.cos(math.pi * world_s / DURATION_S))
+
+
 def write_scene(folder: Path, epoch_ns: int) -> None:
     """Simulate the scene (needs the extra `sim`) and write it, with the station file that belongs to it."""
     from dataclasses import replace
@@ -90,10 +98,6 @@ def write_scene(folder: Path, epoch_ns: int) -> None:
     SENSOR_SETS["hil"] = SensorSet("hil", camera, PAPER.encoders)
     config = shipped_config_dir()
     text = (config / "station-sim.toml").read_text()
-    # m1 with the colours of two neighbouring disks exchanged: a mirror image, which no pose of m0 looks like.
-    m0, m1 = text.split("[markers.m1]")
-    first, second = "[214, 40, 57], [124, 181, 24]", "[124, 181, 24], [214, 40, 57]"
-    text = m0 + "[markers.m1]" + m1.replace(first, second, 1)
     (folder / "armeo_spring.urdf").write_text((config / "armeo_spring.urdf").read_text())
     (folder / STATION_FILE).write_text(text)
     world = build_world(
@@ -110,10 +114,11 @@ def write_scene(folder: Path, epoch_ns: int) -> None:
     frames = round(DURATION_S * FRAME_RATE_HZ) + 1
     arrays: dict[str, np.ndarray] = {}
     for name in ("r0", "r1"):
-        images = [world.render(name, start_ns + round(k * 1e9 / FRAME_RATE_HZ)) for k in range(frames)]
+        images = [world.render(name, start_ns + round(movement_s(k / FRAME_RATE_HZ) * 1e9)) for k in range(frames)]
         arrays[f"color_{name}"] = np.stack([image.color_rgb for image in images])
         arrays[f"depth_{name}"] = np.stack([image.depth_counts for image in images if image.depth_counts is not None])
-    truth = [world.truth_at(start_ns + round(k * 1e9 / TRUTH_RATE_HZ)) for k in range(round(DURATION_S * TRUTH_RATE_HZ) + 1)]
+    samples = round(DURATION_S * TRUTH_RATE_HZ) + 1
+    truth = [world.truth_at(start_ns + round(movement_s(k / TRUTH_RATE_HZ) * 1e9)) for k in range(samples)]
     joints = world.encoder_info().joint_names
     arrays["joints_rad"] = np.array([[sample.joints_rad[joint] for joint in joints] for sample in truth])
     arrays["gh_from_arm"] = np.stack([sample.gh_from_arm for sample in truth])
