@@ -90,7 +90,8 @@ def latency(
     pooled = {key: _pooled([result[key] for result in found]) for key in CANDIDATES}
     clinic = scenarios[0].undisturbed().model_copy(update={"duration_s": _COMPUTING_S}).world()
     computing = {
-        key: measure_computing(clinic, method, settings.computing_frames, clock) for key, (method, _) in CANDIDATES.items()
+        method: measure_computing(clinic, method, settings.computing_frames, clock)
+        for method in dict.fromkeys(method for method, _ in CANDIDATES.values())
     }
     return {
         "study": "latency",
@@ -111,9 +112,9 @@ def latency(
                 "age_ms": found[0][key]["age_ms"],
                 "effective_delay_ms": effective_delay_ms(*pooled[key]),
                 "published_deg": _rms(pooled[key][1]),
-                **asdict(computing[key]),
+                **asdict(computing[method]),
             }
-            for key in CANDIDATES
+            for key, (method, _) in CANDIDATES.items()
         ],
     }
 
