@@ -127,6 +127,6 @@ def _statements(summary: Row) -> tuple[Statement, ...]:
         if not mine:
             continue
         won = [v for v in mine if v["fused_wins"]]
-        evidence = "; ".join(f"{v['movement']} ({v['sensor']}): {v['verdict']}" for v in mine if not v["fused_wins"])
+        evidence = "\n".join(f"{v['movement']} ({v['sensor']}): {v['verdict']}" for v in mine if not v["fused_wins"])
         statements.append(Statement(f"against {title}: in {len(won)} of {len(mine)} rows", len(won) == len(mine), evidence))
     return tuple(statements)

@@ -61,7 +61,7 @@ class Statement:
     Attributes:
         text: The statement.
         holds: Whether it holds.
-        evidence: The figures behind the verdict.
+        evidence: The figures behind the verdict; every line a paragraph.
         explanation: Why.
     """
 
