@@ -43,7 +43,7 @@ def test_a_recording_from_devices_gives_the_angles_published_live(
     # Not all: off line a frame counts from its arrival on, live when vision is through with it.
     assert len(same_inputs) > 0.25 * len(live) > 40
     errors = [difference(sample, again[sample.body["t_sample_ns"]]) for sample in same_inputs]
-    # Nor to the last digit: without lag, the filter behind them has taken frames in when they came, live and off line not alike.
+    # Nor to the last digit: without lag, earlier frames have been taken in when they came, live and off line not alike.
     assert np.percentile(errors, 95) < 2e-3
 
 
