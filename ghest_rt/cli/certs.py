@@ -9,6 +9,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
+from ghest_rt.cli.options import Json
 from ghest_rt.security.extra import need_security
 from ghest_rt.security.roles import Role, parse_common_name
 
@@ -36,9 +37,6 @@ _Hosts = Annotated[
     typer.Option(
         "--host", metavar="HOST", help="Name or address that others connect to it by; may be repeated", show_default=False
     ),
-]
-_Json = Annotated[
-    bool, typer.Option("--json", metavar="", help="Print one JSON document on standard output and nothing else there")
 ]
 _DEFAULT_PKI = Path("ghest-pki")
 
@@ -98,7 +96,7 @@ def revoke(name: _Name, pki: _Pki = _DEFAULT_PKI) -> None:
 
 
 @app.command("list")
-def list_identities(pki: _Pki = _DEFAULT_PKI, as_json: _Json = False) -> None:
+def list_identities(pki: _Pki = _DEFAULT_PKI, as_json: Json = False) -> None:
     """Show every certificate issued, with its state."""
     authority = _open(pki)
     now = datetime.now(UTC)

@@ -1,6 +1,7 @@
-"""Choices and repeated options offered on the command line."""
+"""Choices and options that several commands offer."""
 
 from enum import StrEnum
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -54,6 +55,42 @@ class SoftTissue(StrEnum):
     SEVERE = "severe"
 
 
+MOVEMENTS = "|".join(Movement)
+
+RecordingFile = Annotated[Path, typer.Argument(metavar="RECORDING", help="Recording (.mcap)", show_default=False)]
+StationFile = Annotated[Path, typer.Option(metavar="FILE", help="Station file", show_default=False)]
+OtherStation = Annotated[
+    Path | None,
+    typer.Option(metavar="FILE", help="Station file to use instead of the one in the recording", show_default=False),
+]
+MethodOption = Annotated[
+    Method | None,
+    typer.Option(help="How markers are found and angles estimated; by default what the station file says", show_default=False),
+]
+ListenEndpoint = Annotated[
+    str | None,
+    typer.Option(
+        metavar="ENDPOINT",
+        help="Where Zenoh listens, instead of the station file's endpoints; tcp/127.0.0.1:0 takes any free port",
+        show_default=False,
+    ),
+]
+NoPublish = Annotated[bool, typer.Option("--no-publish", metavar="", help="Do not open Zenoh at all")]
+Identity = Annotated[
+    Path | None, typer.Option(metavar="FOLDER", help="Who you are, for endpoints with TLS", show_default=False)
+]
+Duration = Annotated[
+    float | None, typer.Option("--duration", min=0.1, metavar="SECONDS", help="Stop after this long", show_default=False)
+]
+SimulatedMovement = Annotated[
+    Movement,
+    typer.Option(help="What the patient of a simulated station does (Table 2)", case_sensitive=False, metavar=MOVEMENTS),
+]
+SimulatedSeed = Annotated[int, typer.Option(metavar="N", help="Of a simulated station")]
+Json = Annotated[
+    bool, typer.Option("--json", metavar="", help="Print one JSON document on standard output and nothing else there")
+]
+Verbose = Annotated[bool, typer.Option("--verbose", "-v", metavar="", help="Log more, to standard error")]
 Shifts = Annotated[
     list[str] | None,
     typer.Option(

@@ -5,8 +5,8 @@ from typing import Annotated, Any
 
 import typer
 
-from ghest_rt.cli.options import Sensor
-from ghest_rt.cli.study.options import Duration, Json, Methods, Motions, Movements, Out, Quick, Scheduler, Workers
+from ghest_rt.cli.options import Json, Sensor
+from ghest_rt.cli.study.options import Duration, Methods, Motions, Movements, Out, Quick, Scheduler, Workers
 
 _QUICK_DURATION_S = 2.0
 _TITLES = {"m0_m": "m0\nmm", "m1_m": "m1\nmm", "position_m": "arm\nmm", "orientation_deg": "arm\n°"}

@@ -5,8 +5,8 @@ from typing import Annotated, Any, cast
 
 import typer
 
-from ghest_rt.cli.options import Sensor
-from ghest_rt.cli.study.options import Duration, Json, Motions, Movements, Out, Quick, Scheduler, Workers
+from ghest_rt.cli.options import Json, Sensor
+from ghest_rt.cli.study.options import Duration, Motions, Movements, Out, Quick, Scheduler, Workers
 
 
 def latency(

@@ -5,13 +5,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ghest_rt.cli.options import Method, Movement
+from ghest_rt.cli.options import MOVEMENTS, Method, Movement
 from ghest_rt.errors import BadInputError
 
 if TYPE_CHECKING:
     from ghest_rt.estimation.pipeline import Method as MethodName
-
-_MOVEMENTS = "|".join(Movement)
 
 Movements = Annotated[
     list[Movement] | None,
@@ -20,7 +18,7 @@ Movements = Annotated[
         help="Only this movement of Table 2; again for more. By default all four",
         show_default=False,
         case_sensitive=False,
-        metavar=_MOVEMENTS,
+        metavar=MOVEMENTS,
     ),
 ]
 Methods = Annotated[
@@ -59,9 +57,6 @@ Duration = Annotated[
     typer.Option("--duration", min=0.1, metavar="SECONDS", help="Only the first seconds of every movement", show_default=False),
 ]
 Quick = Annotated[bool, typer.Option("--quick", metavar="", help="A small version of the study, to see that it works")]
-Json = Annotated[
-    bool, typer.Option("--json", metavar="", help="Print one JSON document on standard output and nothing else there")
-]
 
 
 def chosen_methods(methods: list[Method] | None) -> "tuple[MethodName, ...]":

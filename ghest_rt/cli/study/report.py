@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from ghest_rt.cli.study.options import Json
+from ghest_rt.cli.options import Json
 
 
 def report(

@@ -5,8 +5,8 @@ from typing import Annotated, Any
 
 import typer
 
-from ghest_rt.cli.options import Sensor
-from ghest_rt.cli.study.options import Duration, Json, Methods, Motions, Movements, Out, Quick, Scheduler, Workers
+from ghest_rt.cli.options import Json, Sensor
+from ghest_rt.cli.study.options import Duration, Methods, Motions, Movements, Out, Quick, Scheduler, Workers
 
 _QUICK_SOBOL_SAMPLES = 16
 
