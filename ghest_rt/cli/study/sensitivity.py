@@ -7,6 +7,7 @@ import typer
 
 from ghest_rt.cli.options import Json, Sensor
 from ghest_rt.cli.study.options import Duration, Methods, Motions, Movements, Out, Quick, Scheduler, Workers
+from ghest_rt.extras import need_extra
 
 _QUICK_SOBOL_SAMPLES = 16
 
@@ -32,9 +33,9 @@ def sensitivity(
     as_json: Json = False,
 ) -> None:
     """Errors and relative sensitivities as markers shift (Figures 14-17), turn, and as the calibration is wrong."""
-    from ghest_rt.cli.study.running import executor, need_study, shown_progress, store_in
+    from ghest_rt.cli.study.running import executor, shown_progress, store_in
 
-    need_study()
+    need_extra("study", "a study")
     from ghest_rt.cli.study.options import chosen_methods
     from ghest_rt.studies.engine.tables import write_summary, write_tables
     from ghest_rt.studies.figures.sensitivity import save_all
@@ -108,8 +109,8 @@ def _show(document: dict[str, Any], folder: Path) -> None:
         pad_edge=False,
     )
     for column in ("method", "parameter", "amount"):
-        shown.add_column(column)
-    for column in ("position\nmm", "orientation\n°", "S\nposition", "S\norientation"):
+        shown.add_column(column, no_wrap=True)
+    for column in ("position\nmm", "orient.\n°", "S\nposition", "S\norient."):
         shown.add_column(column, justify="right")
     for row in document["at_largest"]:
         amount = f"{row['amount']:g}°" if row["unit"] == "deg" else f"{1e3 * row['amount']:g} mm"
@@ -120,7 +121,7 @@ def _show(document: dict[str, Any], folder: Path) -> None:
             _number(row["S_orientation"], 1.0),
         )
         place = f" ({row['what']} {row['axis']})" if row["group"] == "shift" else ""
-        shown.add_row(row["method"], row["parameter"] + place, amount, *cells)
+        shown.add_row(row["method"], row["parameter"].replace("_", " ") + place, amount, *cells)
     console = Console()
     console.print(shown)
     show_end(console, document, folder)

@@ -56,7 +56,7 @@ def _absolute(rows: Sequence[Row], amount: float, column: str, stronger: str) ->
         why = (
             "m1's x and z axes are always exactly across the arm, while m0's are fixed to the shoulder, so that an arm that "
             "moves is never across one of them all the time: by geometry the worst axis is one of m1's, by a few hundredths of "
-            "a degree up to tenths, as method refined shows. The method's own error, more than half a degree, can hide that."
+            "a degree up to tenths, as method refined shows. The method's own error, half a degree or more, can hide that."
         )
     section = "4.3.1" if what == "position" else "4.3.2"
     name = f"Translations of {stronger} make larger errors of the arm's {what} than those of {weaker} (section {section})"
