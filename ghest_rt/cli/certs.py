@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.table import Table
 
 from ghest_rt.cli.options import Json
-from ghest_rt.security.extra import need_security
+from ghest_rt.extras import need_extra
 from ghest_rt.security.roles import Role, parse_common_name
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ _DEFAULT_PKI = Path("ghest-pki")
 
 @app.callback()
 def _check_installation() -> None:
-    need_security()
+    need_extra("security", "ghest-rt certs")
 
 
 @app.command()

@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.progress import BarColumn, DownloadColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 
 from ghest_rt.errors import BadInputError
-from ghest_rt.security.extra import need_security
+from ghest_rt.extras import need_extra
 from ghest_rt.security.sealing import SEALED_SUFFIX, make_recording_key
 
 
@@ -21,7 +21,7 @@ def decrypt(sealed: Sequence[Path], key: Path, out: Path | None) -> None:
         BadInputError: A file is not sealed, not for this key or not readable; a restored file exists already.
         GhestError: The extra `security` is not installed.
     """
-    need_security()
+    need_extra("security", "a sealed recording")
     from ghest_rt.security.unsealing import load_keys, unseal  # noqa: PLC0415  (needs the extra `security`)
 
     keys = load_keys(key)

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 from rich.console import Console
 
-from ghest_rt.cli.extras import need_simulation
 from ghest_rt.cli.live import LiveFacts, LiveView
 from ghest_rt.cli.options import Method, Movement
 from ghest_rt.cli.publishing import Publishing
@@ -21,6 +20,7 @@ from ghest_rt.config.station import StationConfig
 from ghest_rt.errors import BadInputError, GhestError
 from ghest_rt.estimation.pipeline import Method as PipelineMethod
 from ghest_rt.estimation.pipeline import Pipeline, lag_ns_of
+from ghest_rt.extras import need_extra
 from ghest_rt.service.clocks import ScaledClock
 from ghest_rt.service.compose import AnglesComposer, Numbering
 from ghest_rt.service.contract import ServiceSettings
@@ -157,7 +157,7 @@ def _world(station: LoadedStation, options: RunOptions, start_ns: int) -> "LiveW
     device = station.config.cameras["r0"].device
     if not uses_simulation(station.config) or not isinstance(device, SimBackend):
         return None
-    need_simulation()
+    need_extra("sim", "a simulated station")
     from ghest_rt.cli.sim_world import LiveWorld  # noqa: PLC0415  (needs the extra `sim`)
     from ghest_rt.simulation.command import SimulateOptions  # noqa: PLC0415
 

@@ -1,13 +1,13 @@
 """Estimates as a table in a file: CSV, or Parquet with the extra `parquet`. The same estimates give the same bytes."""
 
 import csv
-import importlib.util
 import math
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 from ghest_rt.errors import BadInputError
 from ghest_rt.estimation.angles import GH_SIGNS, AngleSigns, Arm
+from ghest_rt.extras import need_extra
 from ghest_rt.geometry.so3 import quat_wxyz_from_matrix
 from ghest_rt.messages.results import GhEstimate
 from ghest_rt.service.compose import clinical_deg, sigma_of
@@ -70,15 +70,15 @@ def writer_for(path: Path) -> Writer:
     """Return what writes a table to this file, judged by its ending.
 
     Raises:
-        BadInputError: Another ending, no such folder, or the extra `parquet` is missing.
+        BadInputError: Another ending, or no such folder.
+        GhestError: The extra `parquet` is not installed.
     """
     if not path.parent.is_dir():
         raise BadInputError(f"{path.parent}: no such folder; make it first, or write elsewhere")
     if path.suffix == ".csv":
         return _write_csv
     if path.suffix == ".parquet":
-        if importlib.util.find_spec("pyarrow") is None:
-            raise BadInputError(f"{path}: Parquet needs an extra: pip install 'ghest-rt[parquet]' (or write a .csv)")
+        need_extra("parquet", f"{path} (unlike a .csv)")
         return _write_parquet
     raise BadInputError(f"{path}: name a file that ends in .csv or .parquet")
 

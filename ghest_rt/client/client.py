@@ -15,7 +15,7 @@ from ghest_rt.client.mailbox import CAPACITY, CallbackThread, Updates
 from ghest_rt.client.station_tracker import StationTracker
 from ghest_rt.client.updates import LinkChanged, LinkState, Sample, Update
 from ghest_rt.errors import BadInputError, GhestError
-from ghest_rt.security.extra import need_security
+from ghest_rt.extras import need_extra
 from ghest_rt.security.session import session_settings
 
 if TYPE_CHECKING:
@@ -157,7 +157,7 @@ class GhestClient:
 
 
 def _load(identity: Path) -> "Identity":
-    need_security()
+    need_extra("security", "a connection with TLS")
     from ghest_rt.security.identity_check import load_identity  # noqa: PLC0415  (needs the extra)
 
     return load_identity(identity)

@@ -126,7 +126,10 @@ class Estimator(Strict):
     method: Literal["paper", "refined", "photometric", "fused"] = "fused"
     encoder_pairing: Literal["interpolate", "nearest"] = "interpolate"
     lag_ms: float = Field(
-        default=45.0, ge=0.0, le=500.0, description="A sample is published this long after the instant it holds for; method fused forecasts instead and has none"
+        default=45.0,
+        ge=0.0,
+        le=500.0,
+        description="A sample is published this long after the instant it holds for; method fused forecasts, and has none",
     )
     max_gap_ms: float = Field(default=100.0, gt=0, description="Longest gap in an input that is interpolated over")
     sigma_limit_deg: float = Field(default=5.0, gt=0, description="Above this the sample is `degraded`")
@@ -140,7 +143,7 @@ class Publisher(Strict):
     connect: tuple[str, ...] = ()
     identity: str | None = Field(
         default=None,
-        description="Folder made by `ghest-rt certs issue`, relative to the station file; beyond this machine there must be one",
+        description="Folder made by `ghest-rt certs issue`, relative to the station file; needed beyond this machine",
     )
 
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
+from ghest_rt.extras import need_extra
 from ghest_rt.security.access import AccessList
-from ghest_rt.security.extra import need_security
 from ghest_rt.security.roles import Role
 
 _log = logging.getLogger(__name__)
@@ -65,7 +65,7 @@ def use_identity(folder: Path) -> Identity:
         BadInputError: It cannot be used; names the file and the remedy.
         GhestError: The extra `security` is not installed.
     """
-    need_security()
+    need_extra("security", "a connection with TLS")
     from ghest_rt.security.identity_check import load_identity  # noqa: PLC0415  (needs the extra `security`)
 
     identity, now = load_identity(folder), datetime.now(UTC)

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ghest_rt.errors import BadInputError
-from ghest_rt.security.extra import need_security
+from ghest_rt.extras import need_extra
 
 SEALED_SUFFIX = ".age"
 SEALED_MAGIC = b"age-encryption.org/v1"
@@ -29,7 +29,7 @@ def check_recipients(keys: Sequence[str]) -> None:
         BadInputError: One is malformed, or a secret one.
         GhestError: The extra `security` is not installed.
     """
-    need_security()
+    need_extra("security", "a sealed recording")
     import pyrage  # noqa: PLC0415  (needs the extra `security`)
 
     for key in keys:
@@ -133,7 +133,7 @@ def make_recording_key(path: Path) -> str:
         BadInputError: The file exists, or cannot be written.
         GhestError: The extra `security` is not installed.
     """
-    need_security()
+    need_extra("security", "a sealed recording")
     import pyrage  # noqa: PLC0415  (needs the extra `security`)
 
     identity = pyrage.x25519.Identity.generate()

@@ -6,7 +6,6 @@ delay other requests, never a tick.
 """
 
 import contextlib
-import importlib.util
 import logging
 import socket
 import threading
@@ -19,7 +18,7 @@ from typing import Any, Self
 
 from ghest_rt import __version__
 from ghest_rt.config.metrics import Address
-from ghest_rt.errors import GhestError
+from ghest_rt.extras import need_extra
 from ghest_rt.messages.published import Event, GhAngles, Health
 from ghest_rt.messages.results import GhEstimate
 
@@ -56,8 +55,7 @@ class MetricsEndpoint:
         Raises:
             GhestError: The extra `metrics` is not installed.
         """
-        if importlib.util.find_spec("prometheus_client") is None:
-            raise GhestError("the metrics endpoint needs prometheus-client: pip install 'ghest-rt[metrics]'")
+        need_extra("metrics", "the metrics endpoint")
         host, port = self._address
         try:
             self._server = _Server(self._address, self.text)

@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ghest_drivers.samples import RgbdFrame
-from ghest_rt.errors import BadInputError, GhestError
+from ghest_rt.errors import BadInputError
 from ghest_rt.estimation.angles import AngleSigns, Arm, clinical, euler_yxz, signs_of
 from ghest_rt.estimation.pipeline import Method, Pipeline
+from ghest_rt.extras import need_extra
 from ghest_rt.messages.results import MarkerObservation
 from ghest_rt.recording.reader import Recording
 from ghest_rt.studies.metrics import sample_error
@@ -31,10 +32,9 @@ def draw_recording(path: Path, out: Path, method: Method | None = None, progress
     """
     if out.suffix.lower() not in {".png", ".svg", ".pdf"}:
         raise BadInputError(f"{out}: pictures end in .png, .svg or .pdf")
-    try:
-        from matplotlib.figure import Figure  # noqa: PLC0415 - an extra, imported only when used
-    except ImportError as error:
-        raise GhestError("pictures need Matplotlib: pip install 'ghest-rt[plots]'") from error
+    need_extra("plots", "a picture")
+    from matplotlib.figure import Figure  # noqa: PLC0415 - an extra, imported only when used
+
     run = run_with_truth(path, method, progress=progress)
     figure = Figure(figsize=(11.0, 8.2), layout="constrained")
     grid = figure.add_gridspec(3, 2, height_ratios=(1.5, 1.1, 0.7))

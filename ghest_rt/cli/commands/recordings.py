@@ -62,9 +62,9 @@ def simulate(
     as_json: Json = False,
 ) -> None:
     """Record a simulated patient in the exoskeleton, with the true angles (needs the extra 'sim')."""
-    from ghest_rt.cli.extras import need_simulation
+    from ghest_rt.extras import need_extra
 
-    need_simulation()
+    need_extra("sim", "a simulated patient")
     from ghest_rt.cli.simulate import simulate_recording
     from ghest_rt.simulation.command import SimulateOptions
     from ghest_rt.simulation.disturbances import parse_shift, parse_turn

@@ -60,7 +60,7 @@ def _look(station_path: Path | None, live_s: float | None) -> tuple[list[Finding
     station, findings = _load(station_path)
     backends = _backends(station)
     findings += check_machine()
-    findings += check_extras({EXTRA_OF_BACKEND[name] for name in backends if name in EXTRA_OF_BACKEND})
+    findings += check_extras(_extras(station, backends))
     findings += check_real_time()
     findings += check_host()
     findings.append(check_ticks())
@@ -92,6 +92,15 @@ def _backends(station: LoadedStation | None) -> set[str]:
         return set()
     config = station.config
     return {config.encoders.device.backend, *(camera.device.backend for camera in config.cameras.values())}
+
+
+def _extras(station: LoadedStation | None, backends: set[str]) -> set[str]:
+    needed = {EXTRA_OF_BACKEND[name] for name in backends if name in EXTRA_OF_BACKEND}
+    if station is not None:
+        config = station.config
+        asked = {"security": config.publisher.identity or config.recorder.encrypt_to, "metrics": config.metrics.address}
+        needed |= {extra for extra, wanted in asked.items() if wanted}
+    return needed
 
 
 def _present() -> Present:

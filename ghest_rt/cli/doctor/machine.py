@@ -1,7 +1,6 @@
 """The machine and the installation: Python, extras, permissions, the network port."""
 
 import importlib.metadata
-import importlib.util
 import os
 import platform
 import resource
@@ -11,18 +10,9 @@ from collections.abc import Iterable, Iterator
 
 from ghest_rt import __version__
 from ghest_rt.cli.doctor.findings import Finding, missing, note, ok
+from ghest_rt.extras import MODULES_OF_EXTRA, missing_modules
 
 _FIFO_PRIORITY = 10
-_EXTRAS = {
-    "sim": ("mujoco", "mink", "scipy"),
-    "rt": ("uvloop",),
-    "parquet": ("pyarrow",),
-    "realsense": ("pyrealsense2",),
-    "oak": ("depthai",),
-    "serial": ("serial",),
-    "can": ("can", "cantools", "canopen"),
-    "metrics": ("prometheus_client",),
-}
 EXTRA_OF_BACKEND = {
     "sim": "sim",
     "realsense": "realsense",
@@ -33,6 +23,7 @@ EXTRA_OF_BACKEND = {
     "can_log": "can",
     "canopen": "can",
 }
+_DEVICE_EXTRAS = {"realsense", "oak", "serial", "can"}
 
 
 def check_machine() -> Iterator[Finding]:
@@ -49,13 +40,14 @@ def check_machine() -> Iterator[Finding]:
 
 def check_extras(needed: Iterable[str]) -> Iterator[Finding]:
     """Say which optional parts are installed; those of `needed` must be."""
-    for extra, modules in _EXTRAS.items():
-        absent = [name for name in modules if importlib.util.find_spec(name) is None]
+    for extra, modules in MODULES_OF_EXTRA.items():
+        absent = missing_modules(extra)
         check = f"extra {extra}"
         if not absent:
             yield ok(check, ", ".join(f"{name} {_version(name)}" for name in modules))
         elif extra in needed:
-            yield missing(check, f"not installed: {', '.join(absent)}", f"pip install 'ghest-rt[{extra}]'", exit_code=3)
+            exit_code = 3 if extra in _DEVICE_EXTRAS else 1
+            yield missing(check, f"not installed: {', '.join(absent)}", f"pip install 'ghest-rt[{extra}]'", exit_code)
         else:
             yield note(check, "not installed", f"pip install 'ghest-rt[{extra}]', if it is wanted")
 

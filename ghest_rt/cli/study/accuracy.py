@@ -7,6 +7,7 @@ import typer
 
 from ghest_rt.cli.options import Json, Sensor
 from ghest_rt.cli.study.options import Duration, Methods, Motions, Movements, Out, Quick, Scheduler, Workers
+from ghest_rt.extras import need_extra
 
 _QUICK_DURATION_S = 2.0
 _TITLES = {"m0_m": "m0\nmm", "m1_m": "m1\nmm", "position_m": "arm\nmm", "orientation_deg": "arm\n°"}
@@ -28,9 +29,9 @@ def accuracy(
     """Errors of the markers' and the arm's pose per movement: Tables 5 and 6, Figure 13."""
     from dataclasses import asdict
 
-    from ghest_rt.cli.study.running import executor, need_study, shown_progress, store_in
+    from ghest_rt.cli.study.running import executor, shown_progress, store_in
 
-    need_study()
+    need_extra("study", "a study")
     from ghest_rt.cli.study.options import chosen_methods
     from ghest_rt.studies.accuracy.study import AccuracyPlan, run_accuracy
     from ghest_rt.studies.accuracy.summary import checks, table

@@ -7,6 +7,7 @@ import typer
 
 from ghest_rt.cli.options import Json, Sensor
 from ghest_rt.cli.study.options import Duration, Motions, Movements, Out, Quick, Scheduler, Workers
+from ghest_rt.extras import need_extra
 
 
 def compare(
@@ -24,9 +25,9 @@ def compare(
     as_json: Json = False,
 ) -> None:
     """The rivals beside this system on the same sessions, and whether `fused` wins: Table 7."""
-    from ghest_rt.cli.study.running import executor, need_study, shown_progress, store_in
+    from ghest_rt.cli.study.running import executor, shown_progress, store_in
 
-    need_study()
+    need_extra("study", "a study")
     from ghest_rt.cli.console import print_json
     from ghest_rt.studies import movements as plan
     from ghest_rt.studies.compare import QUICK, CompareSettings

@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from ghest_rt.cli.options import Json
+from ghest_rt.extras import need_extra
 
 
 def report(
@@ -18,9 +19,8 @@ def report(
 ) -> None:
     """Write one self-contained HTML page with every table and figure, the paper's values beside; it needs no network."""
     from ghest_rt.cli.console import print_json
-    from ghest_rt.cli.study.running import need_study
 
-    need_study()
+    need_extra("study", "a study")
     from ghest_rt.studies.report.write import write_report
 
     path = out or results / "report.html"

@@ -1,6 +1,5 @@
 """What every study does on the command line: check the installation, choose where to run, show progress."""
 
-import importlib.util
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -9,24 +8,10 @@ from typing import Any
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-from ghest_rt.errors import GhestError
 from ghest_rt.studies.engine.cluster import ClusterExecutor
 from ghest_rt.studies.engine.local import LocalExecutor
 from ghest_rt.studies.engine.run import Executor
 from ghest_rt.studies.engine.store import ResultStore
-
-_NEEDED = ("joblib", "matplotlib", "mink", "mujoco", "pyarrow", "SALib", "scipy")
-
-
-def need_study() -> None:
-    """Check that what studies need is installed, before anything of it is imported.
-
-    Raises:
-        GhestError: It is not; names the extra.
-    """
-    missing = [name for name in _NEEDED if importlib.util.find_spec(name) is None]
-    if missing:
-        raise GhestError(f"studies need {', '.join(missing)}: pip install 'ghest-rt[study]'")
 
 
 def executor(workers: int | None, scheduler: str | None) -> Executor:

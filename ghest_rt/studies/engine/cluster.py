@@ -5,7 +5,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ghest_rt.errors import BadInputError, GhestError
+from ghest_rt.errors import BadInputError
+from ghest_rt.extras import need_extra
 from ghest_rt.studies.engine.run import Job, Outcome
 from ghest_rt.studies.engine.salt import code_salt
 from ghest_rt.studies.engine.store import ResultStore
@@ -64,10 +65,8 @@ def run_there(task: Task, needs: list[Result]) -> tuple[str, Result, float]:
 
 
 def _distributed() -> Any:
-    try:
-        return importlib.import_module("distributed")
-    except ImportError as error:
-        raise GhestError("a cluster needs Dask: pip install 'ghest-rt[cluster]'") from error
+    need_extra("cluster", "a cluster of Dask")
+    return importlib.import_module("distributed")
 
 
 def _keep(job: Job, future: Any, store: ResultStore) -> Outcome:

@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from ghest_rt.errors import GhestError
+from ghest_rt.extras import need_extra
 from ghest_rt.studies.engine.run import Job, Outcome
 from ghest_rt.studies.engine.store import ResultStore
 
@@ -25,11 +26,10 @@ class LocalExecutor:
         Raises:
             GhestError: joblib is not installed, or a worker process was killed.
         """
-        try:
-            from joblib import Parallel, delayed, parallel_config  # noqa: PLC0415 - an extra, imported only when used
-            from joblib.externals.loky.process_executor import TerminatedWorkerError  # noqa: PLC0415
-        except ImportError as error:
-            raise GhestError("studies need joblib: pip install 'ghest-rt[study]'") from error
+        need_extra("study", "a study")
+        from joblib import Parallel, delayed, parallel_config  # noqa: PLC0415 - an extra, imported only when used
+        from joblib.externals.loky.process_executor import TerminatedWorkerError  # noqa: PLC0415
+
         workers = min(self.workers or os.cpu_count() or 1, max(1, len(jobs)))
         if workers == 1:
             for job in jobs:

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from ghest_rt.errors import GhestError
+from ghest_rt.extras import need_extra
 
 
 def finite(value: float) -> float | None:
@@ -34,11 +35,10 @@ def write_tables(rows: Sequence[Mapping[str, object]], folder: Path, name: str) 
     Raises:
         GhestError: PyArrow is not installed, or the folder cannot be written to.
     """
-    try:
-        import pyarrow as pa  # noqa: PLC0415 - an extra, imported only when used
-        from pyarrow import csv, parquet  # noqa: PLC0415
-    except ImportError as error:
-        raise GhestError("tables of results need PyArrow: pip install 'ghest-rt[study]'") from error
+    need_extra("study", "a table of results")
+    import pyarrow as pa  # noqa: PLC0415 - an extra, imported only when used
+    from pyarrow import csv, parquet  # noqa: PLC0415
+
     table = pa.Table.from_pylist([dict(row) for row in rows])
     paths = folder / f"{name}.csv", folder / f"{name}.parquet"
     try:

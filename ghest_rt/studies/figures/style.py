@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from ghest_rt.errors import GhestError
+from ghest_rt.extras import need_extra
 
 ENDINGS = (".png", ".svg", ".pdf")
 """Every figure is written in these formats."""
@@ -52,11 +53,10 @@ def new_figure(width_in: float, height_in: float) -> Any:
     Raises:
         GhestError: Matplotlib is not installed.
     """
-    try:
-        import matplotlib as mpl  # noqa: PLC0415 - an extra, imported only when used
-        from matplotlib.figure import Figure  # noqa: PLC0415
-    except ImportError as error:
-        raise GhestError("figures need Matplotlib: pip install 'ghest-rt[study]'") from error
+    need_extra("study", "a figure")
+    import matplotlib as mpl  # noqa: PLC0415 - an extra, imported only when used
+    from matplotlib.figure import Figure  # noqa: PLC0415
+
     mpl.rcParams.update(_STYLE)
     return Figure(figsize=(width_in, height_in), layout="constrained")
 

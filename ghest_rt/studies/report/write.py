@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from ghest_rt.errors import BadInputError, GhestError
+from ghest_rt.extras import need_extra
 from ghest_rt.studies.report.accuracy_section import accuracy_section
 from ghest_rt.studies.report.compare_section import compare_section
 from ghest_rt.studies.report.key_figures import key_figures
@@ -41,10 +42,9 @@ def write_report(folder: Path, out: Path) -> list[str]:
         BadInputError: The folder holds no study, or a damaged one.
         GhestError: Jinja2 is not installed, or the file cannot be written.
     """
-    try:
-        from jinja2 import Environment, FileSystemLoader, StrictUndefined  # noqa: PLC0415 - an extra, imported only when used
-    except ImportError as error:
-        raise GhestError("the report needs Jinja2: pip install 'ghest-rt[study]'") from error
+    need_extra("study", "the report")
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined  # noqa: PLC0415 - an extra, imported only when used
+
     summaries = {name: found for name in _STUDIES if (found := read_summary(folder, name)) is not None}
     if not summaries:
         raise BadInputError(f"{folder}: holds no study; run `ghest-rt study accuracy --out {folder}` or another one first")

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ghest_drivers.samples import EncoderSample
-from ghest_rt.errors import GhestError
+from ghest_rt.extras import need_extra
 from ghest_rt.geometry.so3 import Array, log_so3, matrix_from_quat_wxyz, quat_wxyz_from_matrix, slerp
 from ghest_rt.messages.results import GhEstimate, MarkerObservation, Reason, TruthSample
 from ghest_rt.studies.rivals.encoder_only import orientation_only
@@ -153,10 +153,8 @@ class _Attitude:
     """One sensor's filter, stepped up to the instants asked for."""
 
     def __init__(self, track: ImuTrack, gain: float) -> None:
-        try:
-            import imufusion  # noqa: PLC0415 - an extra, imported only when used
-        except ImportError as error:
-            raise GhestError("the inertial rival needs imufusion: pip install 'ghest-rt[study]'") from error
+        need_extra("study", "the inertial rival")
+        import imufusion  # noqa: PLC0415 - an extra, imported only when used
         self._track = track
         self._next = 0
         self._before = self._after = track.earth_from_sensor
