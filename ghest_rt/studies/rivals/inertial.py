@@ -155,6 +155,7 @@ class _Attitude:
     def __init__(self, track: ImuTrack, gain: float) -> None:
         need_extra("study", "the inertial rival")
         import imufusion  # noqa: PLC0415 - an extra, imported only when used
+
         self._track = track
         self._next = 0
         self._before = self._after = track.earth_from_sensor
