@@ -39,6 +39,7 @@ _Hosts = Annotated[
     ),
 ]
 _DEFAULT_PKI = Path("ghest-pki")
+_USED_BY = {Role.STATION: "[publisher] identity", Role.ROUTER: "ghest-rt gateway --identity"}
 
 
 @app.callback()
@@ -118,7 +119,7 @@ def check(
     connect: Annotated[
         str | None,
         typer.Option(
-            metavar="ENDPOINT", help="Also shake hands with this station: tls/bed-1.clinic.lan:7447", show_default=False
+            metavar="ENDPOINT", help="Also shake hands with this station: tls/bed-1.clinic.lan:7446", show_default=False
         ),
     ] = None,
 ) -> None:
@@ -145,7 +146,7 @@ def _open(pki: Path) -> "Authority":
 def _tell(authority: "Authority", name: str, folder: Path) -> None:
     entry = next(entry for entry in reversed(authority.issued()) if entry.common_name == name)
     role, _ = parse_common_name(name)
-    where = "[publisher] identity" if role is Role.STATION else "the program that connects"
+    where = _USED_BY.get(role, "--identity of the program that connects")
     typer.echo(
         f"{name} until {entry.expires:%Y-%m-%d}: "
         f"carry {folder} to its machine ({where}) and delete it here: it holds the private key",

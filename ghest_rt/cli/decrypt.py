@@ -27,13 +27,16 @@ def decrypt(sealed: Sequence[Path], key: Path, out: Path | None) -> None:
     keys = load_keys(key)
     paths = [path for given in sealed for path in _files(given)]
     columns = (TextColumn("{task.description}"), BarColumn(), DownloadColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+    console = Console(stderr=True)
+    with Progress(*columns, console=console, disable=not console.is_terminal, transient=True) as bar:
         for path in paths:
             name = path.name.removesuffix(SEALED_SUFFIX)
             folder = path.parent if out is None else out
             folder.mkdir(parents=True, exist_ok=True)
             if name == path.name and folder == path.parent:
-                raise BadInputError(f"{path}: does not end in {SEALED_SUFFIX}; name another folder with --out")
+                raise BadInputError(
+                    f"{path}: does not end in {SEALED_SUFFIX}; if it is sealed, name a folder with --out"
+                )
             task = bar.add_task(path.name, total=path.stat().st_size)
             restored = unseal(path, folder / name, keys, partial(_advance, bar, task))
             typer.echo(f"{restored.path}: {restored.size_bytes / 1e6:.1f} MB")

@@ -14,6 +14,7 @@ from rich.table import Table
 from rich.text import Text
 
 from ghest_rt.cli.console import print_json
+from ghest_rt.client.names import check_station
 from ghest_rt.errors import DeviceError
 from ghest_rt.messages.published import Event, Health, InputState
 from ghest_rt.messages.results import Reason, Status
@@ -114,11 +115,11 @@ def show_status(
         as_json: One JSON document (while watching: one a second, a line each).
 
     Raises:
-        BadInputError: An endpoint is malformed, or the identity cannot be used.
+        BadInputError: An endpoint or the station's id is malformed, or the identity cannot be used.
         DeviceError: No station is alive.
         GhestError: Zenoh cannot open a session.
     """
-    known = StationWatch(station)
+    known = StationWatch(check_station(station))
     session, _ = open_session(connect=endpoints, identity=None if identity is None else use_identity(identity))
     with StopSignals() as stop, session:
         kept = known.listen(session)

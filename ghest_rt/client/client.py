@@ -1,7 +1,6 @@
 """The client that programs use."""
 
 import json
-import re
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -12,6 +11,7 @@ from ghest_rt.client.connection import Connection
 from ghest_rt.client.hub import Hub
 from ghest_rt.client.limits import Limits
 from ghest_rt.client.mailbox import CAPACITY, CallbackThread, Updates
+from ghest_rt.client.names import check_station
 from ghest_rt.client.station_tracker import StationTracker
 from ghest_rt.client.updates import LinkChanged, LinkState, Sample, Update
 from ghest_rt.errors import BadInputError, GhestError
@@ -20,8 +20,6 @@ from ghest_rt.security.session import session_settings
 
 if TYPE_CHECKING:
     from ghest_rt.security.identity import Identity
-
-_STATION = re.compile(r"[A-Za-z0-9_-]{1,64}|\*")
 
 
 class GhestClient:
@@ -59,8 +57,7 @@ class GhestClient:
         endpoints = (connect,) if isinstance(connect, str) else tuple(connect)
         names = (stations,) if isinstance(stations, str) else tuple(stations)
         for name in names:
-            if not _STATION.fullmatch(name):
-                raise BadInputError(f"{name!r} is not a station id: letters, digits, _ and -, or * for every station")
+            check_station(name)
         who = None if identity is None else _load(identity)
         for endpoint in endpoints:
             session_settings((), (endpoint,), who, "client")

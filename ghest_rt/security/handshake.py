@@ -3,7 +3,7 @@
 import socket
 import ssl
 
-from ghest_rt.errors import GhestError
+from ghest_rt.errors import BadInputError, GhestError
 from ghest_rt.security.endpoints import split_endpoint
 from ghest_rt.security.identity import Identity
 
@@ -24,13 +24,13 @@ def try_handshake(endpoint: str, identity: Identity) -> None:
     """Complete a TLS handshake with a station, and close.
 
     Raises:
-        BadInputError: The endpoint is malformed.
+        BadInputError: The endpoint is malformed, or without TLS.
         GhestError: It does not come about; says which side refuses and why.
     """
     protocol, host, port = split_endpoint(endpoint)
     who = f"{identity.role}.{identity.name}"
     if protocol != "tls":
-        raise GhestError(f"{endpoint}: with an identity connect to tls/{host}:{port}")
+        raise BadInputError(f"{endpoint}: with an identity connect to tls/{host}:{port}")
     context = ssl.create_default_context(ssl.Purpose.SERVER_AUTH, cafile=str(identity.ca))
     context.load_cert_chain(identity.certificate, identity.key)
     try:

@@ -37,7 +37,7 @@ def open_session(
     Args:
         listen: Endpoints to listen on, like "tcp/127.0.0.1:7447".
         connect: Endpoints to connect to; peers that are not there yet are tried again by Zenoh.
-        identity: Who we are; needed beyond this machine, with endpoints like "tls/bed-1.clinic.lan:7447".
+        identity: Who we are; needed beyond this machine, with endpoints like "tls/bed-1.clinic.lan:7446".
         mode: What Zenoh calls the kind of node. A client has one connection, and is refused when nobody answers; a router
             passes messages on between clients and peers, but not from one peer to another.
 
@@ -94,8 +94,10 @@ def _told(error: zenoh.ZError, listen: Sequence[str], connect: Sequence[str]) ->
     if "in use" in reason:
         return GhestError(
             f"Zenoh cannot listen on {', '.join(listen)}: the port is taken, perhaps by another ghest-rt. "
-            "Stop the other program, or choose another port: --listen tcp/127.0.0.1:7448 (port 0 takes any free one)"
+            "Stop the other program, or choose another port with --listen (port 0 takes any free one)"
         )
+    if "Unable to connect" in reason:
+        return GhestError(f"nobody answers at {', '.join(connect)}")
     return GhestError(f"Zenoh cannot open a session (listen {list(listen)}, connect {list(connect)}): {reason}")
 
 
@@ -161,7 +163,8 @@ def _check(listen: Sequence[str], connect: Sequence[str], identity: Identity | N
             )
     if listen and identity is not None and identity.role not in SERVER_ROLES:
         raise BadInputError(
-            f"{identity.folder}: a {identity.role} cannot be listened for on {listen[0]}; issue a certificate for a station"
+            f"{identity.folder}: the identity of a {identity.role} connects, and cannot listen on {listen[0]}; "
+            "issue one with --role router (gateway) or station"
         )
 
 

@@ -78,6 +78,12 @@ def test_without_a_station_the_exit_code_is_3(ghest_rt: Run) -> None:
     assert "no station is alive" in nobody.stderr
 
 
+def test_what_cannot_be_a_station_is_refused(ghest_rt: Run) -> None:
+    refused = ghest_rt("status", "--station", "bed/1")
+    assert refused.returncode == 2
+    assert "not a station id" in refused.stderr
+
+
 def test_a_station_that_tells_nothing_any_more_is_called_silent_or_gone() -> None:
     pacer = Pacer(lambda: 0, lambda t_ns: t_ns, lambda k, t_ns: None)
     health = HealthMeter(0, SampleCounts(), pacer, {}).measure(0, 1, 1)

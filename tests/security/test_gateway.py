@@ -1,6 +1,7 @@
 """Stations that listen on their own machine alone, reached through the gateway."""
 
 import contextlib
+import re
 import socket
 import subprocess
 import sys
@@ -10,6 +11,9 @@ import time
 import pytest
 import zenoh
 
+from ghest_rt.cli.gateway import DEFAULT_LISTEN, DEFAULT_STATION
+from ghest_rt.config.shipped import shipped_systemd_dir
+from ghest_rt.config.station import Publisher
 from ghest_rt.errors import BadInputError, GhestError
 from ghest_rt.security.endpoints import split_endpoint
 from ghest_rt.security.gateway import Gateway
@@ -143,6 +147,14 @@ def test_a_flood_of_handshakes_does_not_use_up_the_files(clinic: Clinic) -> None
         gateway.close()
     assert gateway.reopened
     assert got.is_set()
+
+
+def test_gateway_and_station_as_shipped_do_not_ask_for_the_same_port() -> None:
+    station = {split_endpoint(endpoint)[2] for endpoint in Publisher().listen}
+    assert {split_endpoint(DEFAULT_STATION)[2]} == station
+    unit = (shipped_systemd_dir() / "ghest-rt-gateway.service").read_text()
+    for text in (DEFAULT_LISTEN, re.search(r"--listen (\S+)", unit)[1]):
+        assert split_endpoint(text)[2] not in station
 
 
 @pytest.mark.parametrize("station", ["tcp/10.0.0.1:7447", "tls/127.0.0.1:7447"])

@@ -185,7 +185,7 @@ def test_an_identity_about_to_expire_is_told(clinic: Clinic, caplog: pytest.LogC
         ((), ("tcp/bed-1.lan:7447",), None, "leaves this machine"),
         (("tls/127.0.0.1:7447",), (), None, "needs an identity"),
         (("tcp/127.0.0.1:7447",), (), "station", "every endpoint is tls/host:port"),
-        (("tls/127.0.0.1:7447",), (), "therapy", "cannot be listened for"),
+        (("tls/127.0.0.1:7447",), (), "therapy", "cannot listen on"),
     ],
 )
 def test_nothing_leaves_the_machine_without_tls_and_identity(

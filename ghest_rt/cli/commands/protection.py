@@ -15,7 +15,7 @@ def gateway(
     ],
     listen: Annotated[
         list[str] | None,
-        typer.Option(metavar="ENDPOINT", help="For the network; may be repeated; default tls/0.0.0.0:7447", show_default=False),
+        typer.Option(metavar="ENDPOINT", help="For the network; may be repeated; default tls/0.0.0.0:7446", show_default=False),
     ] = None,
     station: Annotated[
         list[str] | None,
@@ -29,7 +29,7 @@ def gateway(
     """Let therapy software on other machines reach the stations of this one (needs the extra 'security')."""
     from ghest_rt.cli.gateway import run_gateway
 
-    run_gateway(identity, listen or ["tls/0.0.0.0:7447"], station or ["tcp/127.0.0.1:7447"])
+    run_gateway(identity, listen or (), station or ())
 
 
 @app.command("recording-key")
