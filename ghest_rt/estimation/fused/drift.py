@@ -81,6 +81,7 @@ class DriftJudge:
         self._since = kinds == _SINCE
         self._ever = (kinds[:, 2:] == _EVER).any(axis=1)
         self._came = self._since.any(axis=1)
+        self._m1_moved = self._moved[:, 2:].any(axis=1)
         self._cost = self._moved @ np.array([tuning.slide_cost, tuning.turn_cost[0], tuning.slide_cost, tuning.turn_cost[1]])
         length = tuning.unknown_arm_length_m if arm_length_m is None else tuning.arm_length_m
         slides = [np.array(tuning.slide_m) ** 2, np.full(2, tuning.calibrated_m**2), np.full(2, tuning.exact_m**2)]
@@ -92,20 +93,20 @@ class DriftJudge:
         spread = np.concatenate((np.repeat(self._moved, 3, axis=1), np.ones((len(kinds), 1), dtype=bool)), axis=1)
         self._test = np.where(spread, moved, tolerance)
         self._prior = np.where(spread, moved, exact)
-        self._elbow_m2 = tuning.elbow_m**2
         self._explained: _Explained | None = None
         self._weighed: _Explained | None = None
         self._weighed_ns = 0
         self._weights = np.zeros(len(kinds))
         self._against = np.zeros(len(kinds))
 
-    def judge(self, belief: Belief, elbow_moved: Array | None = None) -> Posture:
+    def judge(self, belief: Belief, elbow_moved: Array | None = None, elbow_m2: float = 0.0) -> Posture:
         """Return the bones as the mean over the answers, with the covariance of the mixture.
 
         Args:
             belief: The belief.
             elbow_moved: (3,) how far the elbow, as m1 shows it, has moved in camera r1 since the beginning; axes of m1 as
                 calibrated, m. None if that is not known.
+            elbow_m2: Variance of that per axis without any drift.
         """
         explained = self._explanations(belief)
         found = np.zeros(9)
@@ -113,7 +114,7 @@ class DriftJudge:
         found[:6] -= explained.expected
         P = belief.P[:_KNOWN, :_KNOWN].copy()
         P[15:], P[:, 15:] = 0.0, 0.0
-        P.ravel()[_ELBOW] = _ANYWHERE_M2 if elbow_moved is None else self._elbow_m2
+        P.ravel()[_ELBOW] = _ANYWHERE_M2 if elbow_moved is None else elbow_m2
         if elbow_moved is not None:
             found[6:] = elbow_moved
         weights = self._weigh(belief.t_ns, P[_FOUND, _FOUND], explained, found, elbow_known=elbow_moved is not None)
@@ -137,8 +138,7 @@ class DriftJudge:
         if self._weighed is explained and 0 <= t_ns - self._weighed_ns < _WEIGH_NS:
             return self._weights
         S = P + explained.test
-        distance = np.linalg.solve(S, np.broadcast_to(found[:, None], (len(S), 9, 1)))[:, :, 0] @ found
-        evidence = distance + np.linalg.slogdet(S)[1]
+        evidence = _evidence(S, found)
         # What has been there from the beginning cannot have been missing before, nor what has come since have been there.
         if elbow_known:
             self._against[self._ever] = np.maximum(self._against, evidence - evidence[0] - _CLEAR)[self._ever]
@@ -147,6 +147,11 @@ class DriftJudge:
         cost = evidence + self._cost + self._against
         if not elbow_known:
             cost[self._came] = np.inf
+        if elbow_known:
+            # The elbow tells what has happened to m1, not whether: alone, it has only moved beside the exoskeleton's.
+            markers = _evidence(S[:, :6, :6], found[:6]) + self._cost + self._against
+            cost[self._m1_moved] += _total(markers[self._m1_moved]) - _total(cost[self._m1_moved])
+            cost[~self._m1_moved] = markers[~self._m1_moved]
         odds = np.exp(-0.5 * (cost - cost.min()))
         odds[odds < _NEGLIGIBLE] = 0.0
         self._weights = odds / odds.sum()
@@ -223,6 +228,18 @@ class DriftJudge:
         turns = [_turned(base, drift[TURN[k]]) for k, base in enumerate(belief.base)]
         jumped = [1.0 if base.jumped else p for base, p in zip(belief.base, drifted, strict=True)]
         return Posture(e_from_gh, e_from_elw, covariance, (slides[0], slides[1]), (turns[0], turns[1]), (jumped[0], jumped[1]))
+
+
+def _evidence(S: Array, found: Array) -> Array:
+    """Return -2 log N(found; 0, S) of each of the (h, n, n) covariances, but for a constant."""
+    solved = np.linalg.solve(S, np.broadcast_to(found[:, None], (len(S), len(found), 1)))[:, :, 0]
+    return np.asarray(solved @ found + np.linalg.slogdet(S)[1])
+
+
+def _total(cost: Array) -> float:
+    """Return the cost of any of these answers being right."""
+    least = float(cost.min())
+    return least - 2.0 * float(np.log(np.exp(-0.5 * (cost - least)).sum()))
 
 
 def _turned(base: Base, turn: Array) -> Array:

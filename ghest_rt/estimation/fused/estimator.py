@@ -77,8 +77,9 @@ class FusedEstimator:
         self._filter = FusedFilter(self._tuning, Process(self._tuning, chain.m1_from_elw[:3, 3]))
         self._judge = DriftJudge(self._tuning, chain.m0_from_gh, chain.m1_from_elw, arm_length_m)
         self._axial = AxialJudge(self._tuning)
-        self._elbow = Settled(3, self._tuning.reference_s, self._tuning.elbow_memory_s)
+        self._elbow = Settled(6, self._tuning.reference_s, self._tuning.elbow_memory_s)
         self._unsettled_rad = _UNSETTLED * chain.sigma_limit_rad
+        self._first_r1_from_m1: Array | None = None
         self._compared_ns = 0
         self._carried: Array | None = None
         self._inputs = Inputs(EncoderTrack(chain.limits), CAMERAS, max_gap_ns)
@@ -136,7 +137,7 @@ class FusedEstimator:
         belief = known.copy()
         self._forecast(belief, t_ns, joints)
         stale = self._stale(belief, t_ns)
-        posture = self._judge.judge(belief, self._elbow_moved(belief))
+        posture = self._judge.judge(belief, *self._elbow_moved(belief))
         e_from_arm = step3_4_5_e_from_arm(posture.e_from_gh, posture.e_from_elw)
         covariance = rotation_covariance(posture)
         newest_ns = {**self._inputs.newest_ns, "r0": belief.seen_ns[0], "r1": belief.seen_ns[1], "encoders": joints.newest_ns}
@@ -206,18 +207,31 @@ class FusedEstimator:
         diagonal = belief.P.ravel()[_ARM_DIAGONAL]
         diagonal += turn + place / float(upper_arm @ upper_arm)
 
-    def _elbow_moved(self, belief: Belief) -> Array | None:
-        """Return how far the elbow, as m1 shows it, has moved in camera r1: (3,) axes of m1 as calibrated, m."""
+    def _elbow_moved(self, belief: Belief) -> tuple[Array | None, float]:
+        """Return how far the elbow, as m1 shows it, has moved in camera r1, and the variance of that without any drift.
+
+        It wanders with the arm's attitude in r1: its axis and the exoskeleton's are apart.
+
+        Returns:
+            (3,) axes of m1 as calibrated, m, or None before that is known; m^2 per axis.
+        """
         if not self._elbow.ready:
-            return None
-        in_e = belief.e_from_r1[:3, :3] @ (self._elbow.recent - self._elbow.first)
-        return np.asarray(belief.base[1].turn @ (belief.e_from_marker[1].T @ in_e))
+            return None, 0.0
+        moved = self._elbow.recent - self._elbow.first
+        in_e = belief.e_from_r1[:3, :3] @ moved[:3]
+        variance = self._tuning.elbow_m**2 + self._tuning.elbow_lever_m**2 * float(moved[3:] @ moved[3:])
+        return np.asarray(belief.base[1].turn @ (belief.e_from_marker[1].T @ in_e)), variance
 
     def _compare_elbow(self, belief: Belief, sighting: Sighting) -> None:
         """Note where the exoskeleton has the elbow; let the forearm judge whether m1 slips about the arm."""
         base, R = belief.base[1], sighting.pose[:3, :3]
         elbow = sighting.pose[:3, 3] + R @ (base.turn.T @ (self._chain.m1_from_elw[:3, 3] - base.slide))
-        self._elbow.add(sighting.t_ns, sighting.e_from_r1[:3, :3].T @ (elbow - sighting.e_from_r1[:3, 3]))
+        r1_from_e = sighting.e_from_r1[:3, :3].T
+        r1_from_m1 = r1_from_e @ R
+        if self._first_r1_from_m1 is None:
+            self._first_r1_from_m1 = r1_from_m1
+        attitude = log_so3(r1_from_m1 @ self._first_r1_from_m1.T)
+        self._elbow.add(sighting.t_ns, np.concatenate((r1_from_e @ (elbow - sighting.e_from_r1[:3, 3]), attitude)))
         forearm = self._chain.forearm_in_e(sighting.joints)
         if forearm is None:
             return

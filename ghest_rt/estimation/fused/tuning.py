@@ -54,6 +54,7 @@ class Tuning:
         reference_s: Over this time at first it is learned how forearm and m1 agree, and where the elbow is.
         elbow_memory_s: Over which time the elbow's place is averaged after that.
         elbow_m: How far the elbow may wander in camera r1, per axis.
+        elbow_lever_m: How much farther per radian that the arm turns there: the patient's axis is beside the exoskeleton's.
         axial_noise_rad2_s: Spectral density of the forearm's wander against the arm during movement.
         axial_tolerance_rad: What forearm and m1 may come to disagree by without a slip.
         axial_shift_rad: Standard deviation of a slip of m1 about the arm, if there is one.
@@ -109,6 +110,7 @@ class Tuning:
     reference_s: float = 2.0
     elbow_memory_s: float = 0.3
     elbow_m: float = 0.0025
+    elbow_lever_m: float = 0.015
     axial_noise_rad2_s: float = math.radians(0.5) ** 2 * 0.3
     axial_tolerance_rad: float = math.radians(1.0)
     axial_shift_rad: float = math.radians(8.0)
