@@ -14,7 +14,8 @@ from ghest_rt.estimation.interface import GhEstimator
 from ghest_rt.estimation.pipeline import Method, Pipeline
 from ghest_rt.messages.results import GhEstimate, MarkerObservation
 from ghest_rt.simulation.anatomy import anatomy
-from ghest_rt.simulation.command import SimulateOptions, build_world
+from ghest_rt.simulation.calibrating import with_reference
+from ghest_rt.simulation.command import SimulateOptions, build_world, session_of
 from ghest_rt.simulation.faults import FaultyDevices
 from ghest_rt.simulation.fitting import fit_station
 from ghest_rt.studies.truth import TruthTrack
@@ -50,7 +51,8 @@ class Session:
 
 def observed(options: SimulateOptions, vision: Method) -> Session:
     """Return a session as the detectors of method `vision` see it; `options.out` does not matter."""
-    station = fit_station(load_station(options.station or shipped_station(options)), anatomy(options.height_m))
+    body = anatomy(options.height_m)
+    station = fit_station(load_station(options.station or shipped_station(options)), body)
     calibration = station.config.calibration
     geometry = (station.urdf_text, calibration.link_from_camera, calibration.m0_from_gh, calibration.m1_from_elw)
     key = hashlib.sha256(repr((options, vision, geometry)).encode()).hexdigest()[:16]
@@ -58,7 +60,7 @@ def observed(options: SimulateOptions, vision: Method) -> Session:
     if path.exists():
         found: Session = pickle.loads(path.read_bytes())
         # What does not change the images may have changed in the station file since.
-        return replace(found, station=station)
+        return replace(found, station=with_reference(station, body, options.seed, session_of(options)))
     session = _observe(options, vision)
     path.parent.mkdir(parents=True, exist_ok=True)
     part = path.with_suffix(".part")

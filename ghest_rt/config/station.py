@@ -13,6 +13,10 @@ from ghest_rt.geometry.so3 import Array
 
 STATION_FORMAT = 1
 
+# Farther from its link the elbow cannot be, nor the scapula farther from its attitude in the neutral posture.
+_LONGEST_LINK_M = 1.0
+_MOST_TURN_DEG = 30.0
+
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]{1,64}$")]
 Row = tuple[float, float, float, float]
 Byte = Annotated[int, Field(ge=0, le=255)]
@@ -104,6 +108,35 @@ class Encoders(Strict):
     device: EncoderBackend = Field(discriminator="backend")
 
 
+class CalibrationReference(Strict):
+    """What a calibration session sees besides the markers: neutral posture, elbow bent, every marker where it belongs.
+
+    Method fused holds later sessions against it; docs/fused-estimator.md, section 6. The sigmas are standard deviations, per
+    axis, of how well another session repeats what was seen.
+    """
+
+    elbow_in_link_m: tuple[float, float, float] | None = Field(
+        default=None, description="Elbow's centre in the frame of the link that carries camera r1"
+    )
+    elbow_sigma_m: float = Field(default=0.005, gt=0, le=0.1)
+    forearm_twist_deg: float | None = Field(
+        default=None, ge=-90, le=90, description="Forearm ([elbow].axis) out of the elbow frame's y-z plane, about its y axis"
+    )
+    forearm_sigma_deg: float = Field(default=2.0, gt=0, le=45)
+    scapula_turn_deg: tuple[float, float, float] | None = Field(
+        default=None, description="Rotation vector of e_from_gh, zero when the posture of equation (8) is repeated exactly"
+    )
+    scapula_sigma_deg: float = Field(default=3.0, gt=0, le=45)
+
+    @model_validator(mode="after")
+    def _near(self) -> "CalibrationReference":
+        if self.elbow_in_link_m is not None and np.linalg.norm(self.elbow_in_link_m) > _LONGEST_LINK_M:
+            raise ValueError(f"elbow_in_link_m is more than {_LONGEST_LINK_M:g} m from its link; lengths are in metres")
+        if self.scapula_turn_deg is not None and np.linalg.norm(self.scapula_turn_deg) > _MOST_TURN_DEG:
+            raise ValueError(f"scapula_turn_deg is more than {_MOST_TURN_DEG:g} degrees: this is not the neutral posture")
+        return self
+
+
 class Calibration(Strict):
     """Rigid transforms found by calibration, (4, 4) row by row, metres."""
 
@@ -114,6 +147,7 @@ class Calibration(Strict):
     arm_length_m: float | None = Field(
         default=None, gt=0.1, lt=0.6, description="From elbow to GH centre; lets method fused see m1 slide along the arm"
     )
+    reference: CalibrationReference = CalibrationReference()
 
     def link_from_camera_array(self, camera: str) -> Array:
         """Return T_r^l of eq. (6)."""

@@ -15,6 +15,7 @@ from ghest_rt.config.shipped import shipped_config_dir
 from ghest_rt.errors import BadInputError
 from ghest_rt.recording.writer import RecordingWriter
 from ghest_rt.simulation.anatomy import anatomy
+from ghest_rt.simulation.calibrating import with_reference
 from ghest_rt.simulation.disturbances import MarkerMove, SoftTissueName
 from ghest_rt.simulation.faults import DeviceFault, FaultyDevices
 from ghest_rt.simulation.fitting import fit_station, without_depth
@@ -143,7 +144,7 @@ def build_world(options: SimulateOptions) -> World:
             f"use --arm {station.config.station.arm} or another station file"
         )
     return World(
-        station,
+        with_reference(station, body, options.seed, session_of(options)),
         body,
         _motion(options),
         sensors,
@@ -155,6 +156,12 @@ def build_world(options: SimulateOptions) -> World:
         soft_tissue=find_soft_tissue(options.soft_tissue),
         imaging=options.imaging,
     )
+
+
+def session_of(options: SimulateOptions) -> str:
+    """Return what happens in a session, whatever it is seen with: movement, marker moves, soft tissue."""
+    moves = (f"{move.kind} {move.text}" for move in options.marker_moves)
+    return "; ".join((options.movement or str(options.motion and options.motion.stem), *moves, options.soft_tissue))
 
 
 def _knee_world(options: SimulateOptions, station: LoadedStation) -> StagedWorld:
