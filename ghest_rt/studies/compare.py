@@ -35,7 +35,7 @@ class CompareSettings:
     seeds: int = 1
 
 
-QUICK = CompareSettings(movements=Movements(("COMB",), duration_s=1.5))
+QUICK = Movements(("COMB",), duration_s=1.5)
 """Enough to see that everything runs."""
 
 

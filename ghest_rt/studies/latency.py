@@ -24,6 +24,11 @@ TITLES = {
     "refined": "refined",
     "fused": "fused",
 }
+SPEEDS = (0.5, 1.0, 2.0, 3.0)
+"""How fast movements are played, as factors."""
+
+COMPUTING_FRAMES = 25
+_SPAN_S = 8.0
 _LEAST_IN_BIN = 10
 _COMPUTING_S = 0.6
 
@@ -43,16 +48,17 @@ class LatencySettings:
     """
 
     movements: Movements
-    speeds: tuple[float, ...] = (0.5, 1.0, 2.0, 3.0)
+    speeds: tuple[float, ...] = SPEEDS
     sensor: Literal["paper", "sr300"] = "paper"
     seed: int = 1
-    computing_frames: int = 25
+    computing_frames: int = COMPUTING_FRAMES
 
 
-QUICK = LatencySettings(movements=Movements(("COMB",), duration_s=1.2), speeds=(1.0, 3.0), computing_frames=10)
+QUICK = Movements(("COMB",), duration_s=1.2)
 """Enough to see that everything runs."""
 
-_SPAN_S = 8.0
+QUICK_SPEEDS = (1.0, 3.0)
+QUICK_COMPUTING_FRAMES = 10
 
 
 def latency(

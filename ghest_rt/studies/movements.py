@@ -30,6 +30,11 @@ class Movements:
     motions: tuple[Path, ...] = ()
     duration_s: float | None = None
 
+    def or_else(self, small: "Movements") -> "Movements":
+        """Return these, what was not named taken from a small version of a study."""
+        names = self.names or (() if self.motions else small.names)
+        return Movements(names, self.motions, self.duration_s or small.duration_s)
+
     def scenarios(self, sensor: Literal["paper", "sr300"], seed: int, methods: Sequence[Method]) -> list[Scenario]:
         """Return the undisturbed session of every movement.
 

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from ghest_rt.cli.study.running import store_in
 from ghest_rt.errors import BadInputError, GhestError
 from ghest_rt.studies.engine.cluster import ClusterExecutor
 from ghest_rt.studies.engine.local import LocalExecutor
@@ -110,6 +111,33 @@ def test_results_appear_whole_or_not_at_all(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     with pytest.raises(GhestError, match="cannot be kept"):
         ResultStore(tmp_path / "file" / "below").save("k", Result({}), 0.0)
+
+
+@pytest.mark.parametrize("ending", ["json", "npz"])
+def test_a_damaged_result_is_made_again(tmp_path: Path, ending: str) -> None:
+    log, store = tmp_path / "log", ResultStore(tmp_path / "tasks")
+    task = square_task(4, log)
+    run_tasks([task], store, LocalExecutor(1))
+    file = next(store.folder.glob(f"*.{ending}"))
+    file.write_bytes(file.read_bytes()[:-8])
+    assert [value["found"] for value in run_tasks([task], store, LocalExecutor(1))] == [16]
+    assert runs(log) == ["4", "4"]
+    run_tasks([task], store, LocalExecutor(1))
+    assert runs(log) == ["4", "4"]
+
+
+def test_a_folder_that_cannot_be_written_to_is_refused_before_anything_runs(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    with pytest.raises(BadInputError, match=r"file/study.*cannot be written to.*name another folder"):
+        store_in(tmp_path / "file" / "study")
+    store_in(tmp_path / "new")
+    assert list((tmp_path / "new" / "tasks").iterdir()) == []
+
+
+@pytest.mark.parametrize("address", ["bogus", "node1:8786", "tcp://node1", "tcp://node1:port"])
+def test_what_is_no_address_of_a_scheduler_is_refused_at_once(tmp_path: Path, address: str) -> None:
+    with pytest.raises(BadInputError, match=r"protocol, host and port, such as tcp://"):
+        run_tasks([square_task(1, tmp_path / "log")], ResultStore(tmp_path / "tasks"), ClusterExecutor(address))
 
 
 def test_without_a_scheduler_the_address_is_told(tmp_path: Path) -> None:

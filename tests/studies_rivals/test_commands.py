@@ -8,6 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 from ghest_rt.cli.main import app
+from ghest_rt.studies.movements import Movements
 from ghest_rt.studies.rivals.contenders import CONTENDERS
 
 
@@ -59,3 +60,10 @@ def test_a_motion_file_that_is_not_there_is_named(tmp_path: Path) -> None:
     result = CliRunner().invoke(app, ["study", "compare", "--motion", str(tmp_path / "no.mot"), "--out", str(tmp_path)])
     assert result.exit_code != 0
     assert "no.mot" in str(result.exception)
+
+
+def test_a_quick_study_is_of_what_was_named() -> None:
+    small = Movements(("COMB",), duration_s=1.5)
+    assert Movements().or_else(small) == small
+    assert Movements(("SFE",)).or_else(small) == Movements(("SFE",), duration_s=1.5)
+    assert Movements(motions=(Path("a.mot"),), duration_s=3.0).or_else(small) == Movements((), (Path("a.mot"),), 3.0)

@@ -37,13 +37,14 @@ def compare(
     from ghest_rt.studies.report.results import write_results
 
     names = tuple(m.value for m in movement or ())
+    movements = plan.Movements(names, tuple(motion or ()), duration)
     settings = CompareSettings(
-        movements=plan.Movements(names, tuple(motion or ()), duration),
+        movements=movements.or_else(QUICK) if quick else movements,
         sensors=tuple(s.value for s in sensor or (Sensor.PAPER,)),
         seeds=seeds,
     )
     with shown_progress("compare") as progress:
-        summary = run_compare(QUICK if quick else settings, store_in(out), executor(workers, scheduler), progress)
+        summary = run_compare(settings, store_in(out), executor(workers, scheduler), progress)
     document = write_results(out, "compare", summary, cast(list[dict[str, object]], summary["rows"]))
     for name in document["settings"]["sensors"]:
         save_figure(draw_contenders(document, name), out / "compare" / "figures", f"contenders_{name}")

@@ -39,20 +39,29 @@ def latency(
     from ghest_rt.cli.console import print_json
     from ghest_rt.studies import movements as plan
     from ghest_rt.studies.figures.style import save_figure
-    from ghest_rt.studies.latency import QUICK, LatencySettings
+    from ghest_rt.studies.latency import (
+        COMPUTING_FRAMES,
+        QUICK,
+        QUICK_COMPUTING_FRAMES,
+        QUICK_SPEEDS,
+        SPEEDS,
+        LatencySettings,
+    )
     from ghest_rt.studies.latency import latency as run_latency
     from ghest_rt.studies.report.latency_figures import draw_latency
     from ghest_rt.studies.report.results import write_results
 
     names = tuple(m.value for m in movement or ())
+    movements = plan.Movements(names, tuple(motion or ()), duration)
     settings = LatencySettings(
-        movements=plan.Movements(names, tuple(motion or ()), duration),
-        speeds=tuple(speed or (0.5, 1.0, 2.0, 3.0)),
+        movements=movements.or_else(QUICK) if quick else movements,
+        speeds=tuple(speed or (QUICK_SPEEDS if quick else SPEEDS)),
         sensor=sensor.value,
         seed=seed,
+        computing_frames=QUICK_COMPUTING_FRAMES if quick else COMPUTING_FRAMES,
     )
     with shown_progress("latency") as progress:
-        summary = run_latency(QUICK if quick else settings, store_in(out), executor(workers, scheduler), progress)
+        summary = run_latency(settings, store_in(out), executor(workers, scheduler), progress)
     document = write_results(out, "latency", summary, cast(list[dict[str, object]], summary["rows"]))
     save_figure(draw_latency(document), out / "latency" / "figures", "latency")
     if as_json:

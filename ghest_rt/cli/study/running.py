@@ -20,8 +20,14 @@ def executor(workers: int | None, scheduler: str | None) -> Executor:
 
 
 def store_in(out: Path) -> ResultStore:
-    """Return where tasks' results are kept, below the results folder and common to all studies in it."""
-    return ResultStore(out / "tasks")
+    """Return where tasks' results are kept, below the results folder and common to all studies in it.
+
+    Raises:
+        BadInputError: The folder cannot be written to.
+    """
+    store = ResultStore(out / "tasks")
+    store.prepare()
+    return store
 
 
 @contextmanager

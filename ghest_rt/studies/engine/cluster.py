@@ -4,6 +4,7 @@ import importlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
+from urllib.parse import urlsplit
 
 from ghest_rt.errors import BadInputError
 from ghest_rt.extras import need_extra
@@ -29,10 +30,11 @@ class ClusterExecutor:
         """Yield what became of each job as it ends.
 
         Raises:
-            BadInputError: No scheduler answers at the address.
+            BadInputError: The address is none, or no scheduler answers there.
             GhestError: Dask is not installed.
         """
         dask = _distributed()
+        _check(self.address)
         try:
             client = dask.Client(self.address, timeout=self.connect_s, set_as_default=False)
         except (OSError, ValueError) as error:
@@ -62,6 +64,17 @@ class ClusterExecutor:
 def run_there(task: Task, needs: list[Result]) -> tuple[str, Result, float]:
     """Run a task on a worker; return the worker's hash of the code, the result, and its processor time."""
     return code_salt(task.kind), *task.run(needs)
+
+
+def _check(address: str) -> None:
+    # Dask would start its client before it reads the address, and wait for it to end.
+    try:
+        parts = urlsplit(address)
+        complete = bool(parts.scheme and parts.hostname and parts.port)
+    except ValueError:
+        complete = False
+    if not complete:
+        raise BadInputError(f"--scheduler {address}: give protocol, host and port, such as tcp://node1:8786")
 
 
 def _distributed() -> Any:

@@ -2,13 +2,14 @@
 
 import json
 import os
+import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ghest_rt.errors import GhestError
+from ghest_rt.errors import BadInputError, GhestError
 from ghest_rt.studies.engine.task import Result
 
 
@@ -17,6 +18,7 @@ class ResultStore:
     """A folder of results named by their tasks' keys: `<key>.json`, with `<key>.npz` beside it where there are arrays.
 
     A result is there once its JSON file is: files appear whole or not at all, whatever happens to the process that writes.
+    One that was damaged afterwards does not count as there, and is made again.
 
     Attributes:
         folder: Where they are.
@@ -24,9 +26,32 @@ class ResultStore:
 
     folder: Path
 
+    def prepare(self) -> None:
+        """Make the folder, before hours are spent on results that could not be kept.
+
+        Raises:
+            BadInputError: It cannot be made or written to.
+        """
+        probe = self.folder / f".{os.getpid()}.probe"
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+            probe.touch()
+            probe.unlink()
+        except OSError as error:
+            raise BadInputError(
+                f"--out: {self.folder} cannot be written to: {error.strerror or error}; name another folder"
+            ) from error
+
     def has(self, key: str) -> bool:
-        """Say whether a result is there."""
-        return self._json(key).is_file()
+        """Say whether a result is there, whole."""
+        try:
+            found = self._read(key)
+        except (OSError, ValueError):
+            return False
+        if not isinstance(found, dict) or not {"cpu_s", "values"} <= set(found):
+            return False
+        with_arrays = found.get("arrays", self._npz(key).exists())
+        return not with_arrays or zipfile.is_zipfile(self._npz(key))
 
     def save(self, key: str, result: Result, cpu_s: float) -> None:
         """Keep a result.
@@ -46,7 +71,8 @@ class ResultStore:
                 np.savez(part, allow_pickle=False, **result.arrays)
                 part.replace(self._npz(key))
             part = self.folder / f".{key}.{os.getpid()}.json"
-            part.write_text(json.dumps({"cpu_s": cpu_s, "values": result.values}), encoding="utf-8")
+            kept = {"cpu_s": cpu_s, "values": result.values, "arrays": bool(result.arrays)}
+            part.write_text(json.dumps(kept), encoding="utf-8")
             part.replace(self._json(key))
         except OSError as error:
             raise GhestError(f"{self.folder}: results cannot be kept: {error.strerror or error}") from error

@@ -12,6 +12,9 @@ _PANELS = (
     ("position_m", "position of the upper arm", "error (mm)", 1e3),
     ("orientation_deg", "orientation of the upper arm", "error (°)", 1.0),
 )
+_LEGEND_COLUMNS = 4
+"""More would not fit the width."""
+
 _BOX = ("whislo", "q1", "med", "q3", "whishi")
 
 
@@ -64,7 +67,7 @@ def draw_figure_13(rows: Sequence[dict[str, object]], sensor: str) -> Any:
         axes.set_xticks(range(len(movements)), movements)
         axes.grid(axis="x", visible=False)
     handles, labels = axes.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=len(labels), frameon=False)
+    figure.legend(handles, labels, loc="outside lower center", ncols=min(len(labels), _LEGEND_COLUMNS), frameon=False)
     return figure
 
 

@@ -13,7 +13,7 @@ ENDINGS = (".png", ".svg", ".pdf")
 METHOD_COLORS: Mapping[str, str] = {
     "paper": "#D55E00",
     "refined": "#0072B2",
-    "photometric": "#009E73",
+    "photometric": "#56B4E9",
     "fused": "#009E73",
     "aruco": "#CC79A7",
 }

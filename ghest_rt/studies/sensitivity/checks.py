@@ -51,7 +51,11 @@ def _absolute(rows: Sequence[Row], amount: float, column: str, stronger: str) ->
             f"of {weaker} {scale * max(weak):.2f} {unit} (means of the axes {means})"
         )
     if what == "position":
-        why = "What differs between them is the method's own error, a millimetre at most, which adds or cancels."
+        why = (
+            "The paper's reason, that m0 changes the length of the arm's vector more, is none by that geometry: either end "
+            "displaced along the arm changes it alike. (Of the relative sensitivities it says itself that all translations "
+            "contribute similarly.) What differs is the method's own error, a millimetre at most, which adds or cancels."
+        )
     else:
         why = (
             "m1's x and z axes are always exactly across the arm, while m0's are fixed to the shoulder, so that an arm that "
