@@ -16,10 +16,14 @@ _CURVED_S = 0.020
 # Samples nearer together or farther apart than this give no rate.
 _LEAST_STEP_NS = 4_000_000
 _MOST_STEP_NS = 60_000_000
-# The two forecasts: a parabola through three samples, and one fitted to more of them where encoders are coarse.
+# Samples that the two parabolas are fitted to: as many as it takes, and more of them where encoders are coarse.
 _FITTED = (3, 7)
+# Lines: shares of the rate over the last step, and over the last two, that go on. Recorded movement of people is jerky.
+_SHARES, _SHARES_OF_TWO = (0.0, 0.5, 1.0), (0.5, 1.0)
 # Share of the newest sample in what is known of a forecast's errors.
 _FOLLOW = 0.04
+# Keeps the weights of forecasts without any error finite, rad^2.
+_LEAST_SQUARE = 1e-14
 # A parabola through three samples, carried on by one step, errs by 4.5 times the error of a sample.
 _ONE_STEP = 20.0
 
@@ -46,7 +50,8 @@ class Joints:
 class JointForecast:
     """Interpolates between encoder samples and forecasts from the last few, never farther than asked.
 
-    Two forecasts compete, joint by joint; the one that has lately foretold samples better is used.
+    Seven forecasts compete, joint by joint: two parabolas, and lines that go on with all, half or nothing of the rate. Each has a
+    say by how well it has lately foretold samples (weights by the fourth power of the RMS error).
     """
 
     def __init__(self, encoders: EncoderTrack, max_gap_ns: int) -> None:
@@ -60,12 +65,13 @@ class JointForecast:
         self._max_gap_ns = max_gap_ns
         self._last: deque[EncoderSample] = deque(maxlen=max(_FITTED))
         self._step_s = 0.0
-        # (2, 3, n): of each forecast and joint, position, rate and half the acceleration at the newest sample.
-        self._parabolas: Array | None = None
-        self._chosen: Array | None = None
-        # (2, n): mean squares of the errors of each forecast by one step; None before there are any.
+        # (7, 3, n): of each forecast and joint, position, rate and half the acceleration at the newest sample.
+        self._forecasts: Array | None = None
+        # (7, n): mean squares of the errors of each forecast by one step; None before there are any.
         self._errors: Array | None = None
-        # (n,) mean squares of the errors of a sample, and of the better forecast by one step.
+        # (3, n): the mean of the forecasts, weighted.
+        self._mean: Array | None = None
+        # (n,) mean squares of the errors of a sample, and of the mean forecast by one step.
         self._of_sample = self._of_step = np.zeros(0)
 
     def add(self, sample: EncoderSample) -> None:
@@ -76,12 +82,12 @@ class JointForecast:
             return
         if step_ns > _MOST_STEP_NS:
             last.clear()
-        elif self._parabolas is not None:
+        elif self._forecasts is not None:
             self._judge(sample, step_ns * 1e-9)
         last.append(sample)
         self._step_s = step_ns * 1e-9
-        self._parabolas = np.array([_parabola(last, count) for count in _FITTED]) if len(last) >= min(_FITTED) else None
-        self._chosen = self._choose()
+        self._forecasts = _forecasts(last) if len(last) >= min(_FITTED) else None
+        self._mean = self._weighted()
 
     def at(self, t_ns: int) -> Joints | None:
         """Return the joints at `t_ns`; None if the encoders say nothing about it."""
@@ -97,7 +103,7 @@ class JointForecast:
         return Joints(self._forecast(ahead_ns * 1e-9), self._variance(ahead_ns * 1e-9), ahead_ns, ahead_ns, newest_ns)
 
     def _forecast(self, ahead_s: float) -> Array:
-        if self._chosen is None:
+        if self._mean is None:
             last = self._last[-1]
             if len(self._last) < 2:
                 return last.angles_rad
@@ -105,7 +111,7 @@ class JointForecast:
             slope = (last.angles_rad - before.angles_rad) / (last.t_capture_ns - before.t_capture_ns)
             return np.asarray(last.angles_rad + (ahead_s * 1e9) * slope)
         curved_s = min(ahead_s, _CURVED_S)
-        position, rate, bend = self._chosen
+        position, rate, bend = self._mean
         return np.asarray(position + ahead_s * rate + curved_s * (2.0 * ahead_s - curved_s) * bend)
 
     def _variance(self, ahead_s: float) -> Array:
@@ -120,19 +126,45 @@ class JointForecast:
 
     def _judge(self, sample: EncoderSample, step_s: float) -> None:
         """Learn from what a new sample shows of the forecasts."""
-        if self._parabolas is None:
+        if self._forecasts is None or self._mean is None:
             return
-        position, rate, bend = self._parabolas[:, 0], self._parabolas[:, 1], self._parabolas[:, 2]
-        missed = position + step_s * rate + (step_s * step_s) * bend - sample.angles_rad
+        missed = _on(self._forecasts, step_s) - sample.angles_rad
         squares = missed * missed
-        errors = squares if self._errors is None else self._errors + _FOLLOW * (squares - self._errors)
-        self._errors = errors
-        self._of_sample, self._of_step = errors[0] * (1.0 / _ONE_STEP), np.minimum(errors[0], errors[1])
+        missed = _on(self._mean, step_s) - sample.angles_rad
+        square = missed * missed
+        if self._errors is None:
+            self._errors, self._of_step = squares, square
+        else:
+            self._errors = self._errors + _FOLLOW * (squares - self._errors)
+            self._of_step = self._of_step + _FOLLOW * (square - self._of_step)
+        self._of_sample = self._errors[0] * (1.0 / _ONE_STEP)
 
-    def _choose(self) -> Array | None:
-        if self._parabolas is None or self._errors is None:
-            return None if self._parabolas is None else np.asarray(self._parabolas[0])
-        return np.asarray(np.where(self._errors[1] < self._errors[0], self._parabolas[1], self._parabolas[0]))
+    def _weighted(self) -> Array | None:
+        if self._forecasts is None or self._errors is None:
+            return None if self._forecasts is None else np.asarray(self._forecasts[0])
+        weights = 1.0 / np.square(self._errors + _LEAST_SQUARE)
+        weights /= weights.sum(axis=0)
+        return np.asarray((weights[:, None] * self._forecasts).sum(axis=0))
+
+
+def _on(forecast: Array, ahead_s: float) -> Array:
+    """Return where (..., 3, n) forecasts have the joints, (..., n), a step later."""
+    return np.asarray(forecast[..., 0, :] + ahead_s * forecast[..., 1, :] + (ahead_s * ahead_s) * forecast[..., 2, :])
+
+
+def _forecasts(last: deque[EncoderSample]) -> Array:
+    """Return the (7, 3, n) competing forecasts: position, rate, half the acceleration at the newest sample."""
+    newest, before, earlier = last[-1], last[-2], last[-3]
+    found = np.zeros((len(_FITTED) + len(_SHARES) + len(_SHARES_OF_TWO), 3, len(newest.angles_rad)))
+    for k, count in enumerate(_FITTED):
+        found[k] = _parabola(last, count)
+    lines = found[len(_FITTED) :]
+    lines[:, 0] = newest.angles_rad
+    rate = (newest.angles_rad - before.angles_rad) * (1e9 / (newest.t_capture_ns - before.t_capture_ns))
+    lines[: len(_SHARES), 1] = np.outer(_SHARES, rate)
+    rate = (newest.angles_rad - earlier.angles_rad) * (1e9 / (newest.t_capture_ns - earlier.t_capture_ns))
+    lines[len(_SHARES) :, 1] = np.outer(_SHARES_OF_TWO, rate)
+    return found
 
 
 def _parabola(samples: deque[EncoderSample], count: int) -> Array:
