@@ -50,8 +50,8 @@ class Joints:
 class JointForecast:
     """Interpolates between encoder samples and forecasts from the last few, never farther than asked.
 
-    Seven forecasts compete, joint by joint: two parabolas, and lines that go on with all, half or nothing of the rate. Each has a
-    say by how well it has lately foretold samples (weights by the fourth power of the RMS error).
+    Seven forecasts compete, joint by joint: two parabolas, and lines that go on with all, half or nothing of the rate. Each
+    has a say by how well it has lately foretold samples (weights by the fourth power of the RMS error).
     """
 
     def __init__(self, encoders: EncoderTrack, max_gap_ns: int) -> None:
