@@ -12,6 +12,7 @@ from ghest_rt.estimation.fused.axial import AxialJudge, twist_rad
 from ghest_rt.estimation.fused.belief import ARM, SIZE, Belief
 from ghest_rt.estimation.fused.drift import DriftJudge
 from ghest_rt.estimation.fused.filter import FusedFilter
+from ghest_rt.estimation.fused.freshness import Freshness, encoders_overdue
 from ghest_rt.estimation.fused.joints import JointForecast, Joints
 from ghest_rt.estimation.fused.process import Process
 from ghest_rt.estimation.fused.report import drift_report, rotation_covariance
@@ -29,19 +30,12 @@ from ghest_rt.sync.encoder_track import EncoderTrack
 
 # Both markers must have been seen within this time for the filter to start.
 _START_NS = 100_000_000
-# Encoder samples farther apart than this are a gap: no known link is slower than 40 Hz.
-_ENCODER_BRIDGE_NS = 40_000_000
-# A camera's latency is followed by a tenth per frame downwards, by a hundredth upwards: a busy machine holds frames up now and
-# then.
-_FOLLOW, _FOLLOW_UP = 0.1, 0.01
 # Nothing is bridged for longer, however certain it looks.
 _LONGEST_BRIDGE_NS = 3_000_000_000
 # A drift is compensated when the markers no longer contradict each other, and the rotation's standard deviation is below this
 # share of the station's limit.
 _SETTLED_SLACK = 10.0
 _UNSETTLED = 0.2
-# Frames come this much later than usual now and then.
-_JITTER_NS = 8_000_000
 # Elbow and forearm are compared with m1 this often: their disagreement is slow.
 _COMPARE_NS = 40_000_000
 # By how much a joint is moved to see how far it carries camera r1, rad or m.
@@ -84,8 +78,7 @@ class FusedEstimator:
         self._carried: Array | None = None
         self._inputs = Inputs(EncoderTrack(chain.limits), CAMERAS, max_gap_ns)
         self._joints = JointForecast(self._inputs.encoders, max_gap_ns)
-        self._patience_ns = [8 * period_ns[camera] // 5 for camera in CAMERAS]
-        self._latency_ns: list[float] = [0.0, 0.0]
+        self._freshness = Freshness([period_ns[camera] for camera in CAMERAS])
         self._last: list[Sighting | None] = [None, None]
         self._gh_from_m0 = inverse(chain.m0_from_gh)
         self._timeline: Timeline | None = None
@@ -102,10 +95,7 @@ class FusedEstimator:
         if not self._inputs.add_frame(observation) or observation.camera_from_marker is None:
             return
         which = CAMERAS.index(observation.camera)
-        latency_ns = observation.t_arrival_ns - observation.t_capture_ns
-        known = self._latency_ns[which]
-        follow = _FOLLOW_UP if latency_ns > known else _FOLLOW
-        self._latency_ns[which] = known + follow * (latency_ns - known) if self._last[which] else float(latency_ns)
+        self._freshness.saw(which, observation.t_arrival_ns - observation.t_capture_ns)
         sighting = self._sighting(observation, which)
         if sighting is None:
             return
@@ -136,7 +126,7 @@ class FusedEstimator:
             return lost(t_ns, self._why_nothing(t_ns), self._inputs.newest_ns)
         belief = known.copy()
         self._forecast(belief, t_ns, joints)
-        stale = self._stale(belief, t_ns)
+        stale = self._freshness.stale(belief.seen_ns, t_ns)
         posture = self._judge.judge(belief, *self._elbow_moved(belief))
         e_from_arm = step3_4_5_e_from_arm(posture.e_from_gh, posture.e_from_elw)
         covariance = rotation_covariance(posture)
@@ -156,7 +146,7 @@ class FusedEstimator:
         elbow = self._chain.elbow_angles(e_from_arm, joints.positions, posture.covariance[ARM, ARM])
         flagged = drift.m0.flagged or drift.m1.flagged
         unsettled = belief.slack > _SETTLED_SLACK or math.sqrt(float(np.trace(covariance))) > self._unsettled_rad
-        bridged = bool(stale) or joints.gap_ns > _ENCODER_BRIDGE_NS
+        bridged = bool(stale) or encoders_overdue(joints.gap_ns)
         reason = self._weakness(gh_from_arm, covariance, bridged, flagged and unsettled)
         return GhEstimate(
             t_sample_ns=t_ns,
@@ -261,14 +251,6 @@ class FusedEstimator:
 
     def _e_from_r1(self, positions: Array) -> Array:
         return self._chain.e_from_camera(CAMERAS[1], positions)
-
-    def _stale(self, belief: Belief, t_ns: int) -> tuple[int, ...]:
-        """Return the markers whose newest sighting is older than latency and frame rate account for."""
-        return tuple(
-            which
-            for which in (0, 1)
-            if t_ns - belief.seen_ns[which] > self._latency_ns[which] + self._patience_ns[which] + _JITTER_NS
-        )
 
     def _given_up(self, belief: Belief, t_ns: int, covariance: Array) -> bool:
         too_long = t_ns - min(belief.seen_ns) > _LONGEST_BRIDGE_NS
