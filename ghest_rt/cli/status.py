@@ -1,104 +1,23 @@
 """`ghest-rt status`: which stations are alive and how they are, read from what they publish."""
 
 import json
-import threading
 import time
-from dataclasses import dataclass
 from pathlib import Path
 
-import zenoh
-from pydantic import ValidationError
 from rich.console import Console, Group, RenderableType
 from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
 from ghest_rt.cli.console import print_json
-from ghest_rt.client.names import check_station
+from ghest_rt.cli.station_watch import StationState, StationWatch
 from ghest_rt.errors import DeviceError
-from ghest_rt.messages.published import Event, Health, InputState
+from ghest_rt.messages.published import Health, InputState
 from ghest_rt.messages.results import Reason, Status
-from ghest_rt.security.identity import use_identity
-from ghest_rt.security.session import open_session
 from ghest_rt.service.stop_signals import StopSignals
 
 _POLL_S = 0.05
-_SILENT_AFTER_S = 3.0  # health comes once a second
 _STATUS_STYLE = {Status.VALID: "bold green", Status.DEGRADED: "bold yellow", Status.LOST: "bold red"}
-_KEPT_EVENTS = 3
-
-
-@dataclass(slots=True)
-class StationState:
-    """What is known of a station.
-
-    Attributes:
-        alive: Whether its liveliness token is there.
-        health: Its newest message.
-        t_health_s: When that came, monotonic clock of this process.
-        events: Its newest events, oldest first.
-    """
-
-    alive: bool = False
-    health: Health | None = None
-    t_health_s: float = 0.0
-    events: tuple[Event, ...] = ()
-
-    def silent_s(self, now_s: float) -> float | None:
-        """Return for how long it has told nothing, if that is too long."""
-        quiet_s = now_s - self.t_health_s
-        return quiet_s if self.health is not None and quiet_s > _SILENT_AFTER_S else None
-
-
-class StationWatch:
-    """Collects what stations say; Zenoh calls on threads of its own."""
-
-    def __init__(self, station: str) -> None:
-        self._station = station
-        self._lock = threading.Lock()
-        self._stations: dict[str, StationState] = {}
-
-    def listen(self, session: zenoh.Session) -> list[object]:
-        """Subscribe; what is returned must be kept."""
-        prefix = f"ghest/{self._station}"
-        return [
-            session.declare_subscriber(f"{prefix}/health", self._on_health),
-            session.declare_subscriber(f"{prefix}/events", self._on_event),
-            session.liveliness().declare_subscriber(f"{prefix}/alive", self._on_token, history=True),
-        ]
-
-    def stations(self) -> dict[str, StationState]:
-        """Return a copy of what is known, by name."""
-        with self._lock:
-            return {
-                name: StationState(state.alive, state.health, state.t_health_s, state.events)
-                for name, state in sorted(self._stations.items())
-            }
-
-    def _state(self, sample: zenoh.Sample) -> StationState:
-        return self._stations.setdefault(str(sample.key_expr).split("/")[1], StationState())
-
-    def _on_health(self, sample: zenoh.Sample) -> None:
-        try:
-            message = Health.model_validate_json(sample.payload.to_bytes())
-        except ValidationError:  # of another version: its token still tells that it lives
-            return
-        with self._lock:
-            state = self._state(sample)
-            state.health, state.t_health_s = message, time.monotonic()
-
-    def _on_event(self, sample: zenoh.Sample) -> None:
-        try:
-            message = Event.model_validate_json(sample.payload.to_bytes())
-        except ValidationError:
-            return
-        with self._lock:
-            state = self._state(sample)
-            state.events = (*state.events, message)[-_KEPT_EVENTS:]
-
-    def _on_token(self, sample: zenoh.Sample) -> None:
-        with self._lock:
-            self._state(sample).alive = sample.kind == zenoh.SampleKind.PUT
 
 
 def show_status(
@@ -117,17 +36,13 @@ def show_status(
     Raises:
         BadInputError: An endpoint or the station's id is malformed, or the identity cannot be used.
         DeviceError: No station is alive.
-        GhestError: Zenoh cannot open a session.
+        GhestError: The extra `security` is needed and not installed.
     """
-    known = StationWatch(check_station(station))
-    session, _ = open_session(connect=endpoints, identity=None if identity is None else use_identity(identity))
-    with StopSignals() as stop, session:
-        kept = known.listen(session)
+    with StopSignals() as stop, StationWatch(endpoints, station, identity, time.monotonic) as known:
         _wait_for_all(known, wait_s, stop)
         if watch:
             _watch(known, stop, as_json)
-        stations, now_s = known.stations(), time.monotonic()
-        del kept
+        stations, troubles, now_s = known.stations(), known.troubles(), time.monotonic()
     if watch:
         return
     if as_json:
@@ -135,8 +50,9 @@ def show_status(
     else:
         Console().print(page(stations, now_s))
     if not any(state.alive for state in stations.values()):
-        where = ", ".join(endpoints)
-        raise DeviceError(f"no station {'' if station == '*' else station + ' '}is alive on {where}: is the service running?")
+        named = "" if station == "*" else f"{station} "
+        why = "; ".join(troubles) or "is the service running?"
+        raise DeviceError(f"no station {named}is alive on {', '.join(endpoints)}: {why}")
 
 
 def _wait_for_all(known: StationWatch, wait_s: float, stop: StopSignals) -> None:
@@ -218,33 +134,41 @@ def _details(state: StationState) -> list[RenderableType]:
         ),
         Text(
             f"late, last minute: p50 {recent.p50_us / 1000:.2f}  p99 {recent.p99_us / 1000:.2f}  "
-            f"p99.9 {recent.p999_us / 1000:.2f}  max {recent.max_us / 1000:.2f} ms · "
-            f"since start: p99 {health.lateness.p99_us / 1000:.2f}  max {health.lateness.max_us / 1000:.2f} ms"
+            f"p99.9 {recent.p999_us / 1000:.2f}  max {recent.max_us / 1000:.2f} ms"
         ),
+        Text(f"since the start: p99 {health.lateness.p99_us / 1000:.2f}  max {health.lateness.max_us / 1000:.2f} ms"),
         Text(
             f"CPU {health.cpu_percent:.0f} % · {health.memory_mb:.0f} MB · {health.threads} threads · {health.open_files} files"
         ),
-        _inputs(health),
+        *_inputs(health),
     ]
     lines += [Text(f"{event.source}: {event.kind.replace('_', ' ')}: {event.message}", style="dim") for event in state.events]
     return lines
 
 
-def _inputs(health: Health) -> Table:
-    table = Table(box=None, header_style="dim", padding=(0, 2, 0, 0))
-    for column in ("input", "state", "rate", "age", "received", "missing", "skipped", "bad", "reopened", "refused", "temp."):
+def _inputs(health: Health) -> list[RenderableType]:
+    """Return a table that fits in 80 columns, and the reasons for what was refused."""
+    warm = any(item.temperature_c is not None for item in health.inputs.values())
+    table = Table(box=None, header_style="dim", padding=(0, 1, 0, 0), pad_edge=False)
+    columns = ("input", "state", "Hz", "age ms", "received", "missing", "skipped", "bad", "reopened", "refused")
+    for column in (*columns, "°C") if warm else columns:
         table.add_column(column, justify="left" if column in {"input", "state"} else "right")
     for name, item in health.inputs.items():
+        counts = (item.received, item.missing, item.skipped, item.bad, item.reopened, sum(item.refused.values()))
         table.add_row(
             name,
             Text(item.state, style="green" if item.state is InputState.STREAMING else "red"),
-            f"{item.rate_hz:.1f} Hz",
-            "–" if item.age_ms is None else f"{item.age_ms:.0f} ms",
-            *(str(count) for count in (item.received, item.missing, item.skipped, item.bad, item.reopened)),
-            ", ".join(f"{reason} {count}" for reason, count in item.refused.items()) or "–",
-            "–" if item.temperature_c is None else f"{item.temperature_c:.0f} °C",
+            f"{item.rate_hz:.1f}",
+            "–" if item.age_ms is None else f"{item.age_ms:.0f}",
+            *map(str, counts),
+            *(["–" if item.temperature_c is None else f"{item.temperature_c:.0f}"] if warm else []),
         )
-    return table
+    refused = {name: item.refused for name, item in health.inputs.items() if item.refused}
+    reasons = [
+        Text(f"{name} refused: " + ", ".join(f"{reason} {count}" for reason, count in counts.items()))
+        for name, counts in refused.items()
+    ]
+    return [table, *reasons]
 
 
 def _duration(seconds: float) -> str:

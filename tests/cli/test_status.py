@@ -11,7 +11,8 @@ from pathlib import Path
 
 from rich.console import Console
 
-from ghest_rt.cli.status import StationState, page
+from ghest_rt.cli.station_watch import StationState
+from ghest_rt.cli.status import page
 from ghest_rt.messages.published import Health
 from ghest_rt.security.session import open_session
 from ghest_rt.service.health import HealthMeter, SampleCounts

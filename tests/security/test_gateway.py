@@ -12,6 +12,7 @@ import pytest
 import zenoh
 
 from ghest_rt.cli.gateway import DEFAULT_LISTEN, DEFAULT_STATION
+from ghest_rt.cli.station_watch import StationWatch
 from ghest_rt.config.shipped import shipped_systemd_dir
 from ghest_rt.config.station import Publisher
 from ghest_rt.errors import BadInputError, GhestError
@@ -147,6 +148,18 @@ def test_a_flood_of_handshakes_does_not_use_up_the_files(clinic: Clinic) -> None
         gateway.close()
     assert gateway.reopened
     assert got.is_set()
+
+
+def test_status_sees_stations_through_the_gateway(bench: Bench, clinic: Clinic) -> None:
+    with (
+        bench.session.liveliness().declare_token("ghest/sim/alive"),
+        StationWatch((bench.outside,), "*", clinic.therapy, time.monotonic) as watch,
+    ):
+        deadline_s = time.monotonic() + 20.0
+        while not watch.stations():
+            assert time.monotonic() < deadline_s, watch.troubles()
+            time.sleep(0.05)
+    assert watch.stations()["sim"].alive
 
 
 def test_gateway_and_station_as_shipped_do_not_ask_for_the_same_port() -> None:
