@@ -34,9 +34,7 @@ def decrypt(sealed: Sequence[Path], key: Path, out: Path | None) -> None:
             folder = path.parent if out is None else out
             folder.mkdir(parents=True, exist_ok=True)
             if name == path.name and folder == path.parent:
-                raise BadInputError(
-                    f"{path}: does not end in {SEALED_SUFFIX}; if it is sealed, name a folder with --out"
-                )
+                raise BadInputError(f"{path}: does not end in {SEALED_SUFFIX}; if it is sealed, name a folder with --out")
             task = bar.add_task(path.name, total=path.stat().st_size)
             restored = unseal(path, folder / name, keys, partial(_advance, bar, task))
             typer.echo(f"{restored.path}: {restored.size_bytes / 1e6:.1f} MB")
