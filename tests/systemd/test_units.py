@@ -48,7 +48,7 @@ def test_verify_would_complain(install: Install, root: Path) -> None:
 
 
 @needs_systemd
-@pytest.mark.parametrize("unit", ["ghest-rt.service", "ghest-rt@.service"])
+@pytest.mark.parametrize("unit", ["ghest-rt.service", "ghest-rt@.service", "ghest-rt-gateway.service"])
 def test_exposure_is_at_most_2(unit: str) -> None:
     done = analyze("security", "--offline=true", f"--threshold={LARGEST_EXPOSURE}", UNITS / unit)
     assert done.returncode == 0, done.stdout

@@ -48,6 +48,14 @@ def install_service(
     executable: Annotated[
         Path | None, typer.Option(metavar="FILE", help="The ghest-rt that the unit starts, if not this one", show_default=False)
     ] = None,
+    gateway: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FOLDER",
+            help="Also let other machines in by a gateway with this identity (certs issue --role router)",
+            show_default=False,
+        ),
+    ] = None,
     root_dir: Annotated[
         Path, typer.Option("--root", metavar="FOLDER", help="Install into an image of a system; nothing is started")
     ] = Path("/"),
@@ -56,4 +64,4 @@ def install_service(
     from ghest_rt.cli.install_service.command import InstallOptions
     from ghest_rt.cli.install_service.command import install_service as install
 
-    install(InstallOptions(station, name, cpus, executable, root_dir, uninstall, dry_run))
+    install(InstallOptions(station, name, cpus, executable, gateway, root_dir, uninstall, dry_run))

@@ -24,6 +24,7 @@ class InstallOptions:
         name: Of the station among several; None for a single one.
         cpus: CPUs for the service; None for all.
         executable: Program for the unit; None for the one that is running.
+        gateway: Folder of the identity for a gateway to be installed; None for none, or for the one there is.
         root: Folder that stands for "/".
         uninstall: Undo.
         dry_run: Only show.
@@ -33,6 +34,7 @@ class InstallOptions:
     name: str | None
     cpus: str | None
     executable: Path | None
+    gateway: Path | None
     root: Path
     uninstall: bool
     dry_run: bool
@@ -75,6 +77,7 @@ def _plan_install(target: Target, options: InstallOptions) -> Plan:
         executable=options.executable or _running_program(),
         station=options.station,
         cpus=options.cpus,
+        gateway=options.gateway,
         systemd_version=_systemd_version(),
     )
 

@@ -4,6 +4,7 @@ import re
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 
+from ghest_rt.cli.install_service.gateway import GATEWAY_UNIT, IDENTITY_DIR, KEY_PATH, gateway_unit, identity_files
 from ghest_rt.cli.install_service.record import RECORD, Installed, InstalledService, read_record, sha256
 from ghest_rt.cli.install_service.station_files import STATION_FILE, clash, leaves_machine, station_files
 from ghest_rt.cli.install_service.steps import RemoveFile, RunCommand, Step, WriteFile
@@ -73,7 +74,14 @@ class Plan:
 
 
 def plan_install(
-    target: Target, *, shipped: Path, executable: Path, station: Path | None, cpus: str | None, systemd_version: int
+    target: Target,
+    *,
+    shipped: Path,
+    executable: Path,
+    station: Path | None,
+    cpus: str | None,
+    systemd_version: int,
+    gateway: Path | None = None,
 ) -> Plan:
     """Plan an installation or its renewal.
 
@@ -84,6 +92,7 @@ def plan_install(
         station: Station file to install; None to keep the one installed.
         cpus: CPUs for the service, like "2-3"; None for all.
         systemd_version: Decides on settings that older ones do not know.
+        gateway: Folder of the identity of a gateway to install; None to keep what there is.
 
     Raises:
         BadInputError: Something given cannot be used, or a file to be replaced was changed by somebody else.
@@ -91,7 +100,11 @@ def plan_install(
     installed = read_record(target.root)
     plan = Plan()
     files = _system_files(target, shipped, executable, cpus, systemd_version)
-    others = [(unit, target.root / one.station) for unit, one in installed.services.items() if unit != target.unit]
+    others = [
+        (unit, target.root / one.station)
+        for unit, one in installed.services.items()
+        if one.station is not None and unit != target.unit
+    ]
     before = installed.services.get(target.unit)
     station_path = f"{target.config_dir}/{STATION_FILE}"
     if station is not None:
@@ -108,11 +121,21 @@ def plan_install(
     obsolete = _obsolete(target, installed, before, {*files, *kept})
     recorded = {**{path: sha256(data) for path, data in files.items()}, **kept}
     services = {**installed.services, target.unit: InstalledService(files=recorded, station=station_path)}
+    if gateway is not None or GATEWAY_UNIT in installed.services:
+        reached = [station or target.root / station_path, *(path for _, path in others if path.exists())]
+        own, services[GATEWAY_UNIT] = _gateway(
+            target, installed, shipped=shipped, executable=executable, identity=gateway, stations=reached
+        )
+        files.update(own)
     record = Installed(services=services).model_dump_json(indent=2).encode()
     plan.steps += [WriteFile(target.root / RECORD, record)]  # first: whatever follows can be undone
-    plan.steps += [WriteFile(target.root / path, data) for path, data in files.items() if _differs(target.root / path, data)]
+    plan.steps += [
+        WriteFile(target.root / path, data, 0o600 if path == KEY_PATH else 0o644)
+        for path, data in files.items()
+        if _differs(target.root / path, data)
+    ]
     plan.steps += obsolete
-    plan.steps += _activation(target)
+    plan.steps += _activation(target, (target.unit, *([GATEWAY_UNIT] if GATEWAY_UNIT in services else [])))
     if beyond := leaves_machine(config):
         plan.notes.append(f"the unit lets nothing leave this machine; for {', '.join(beyond)} see docs/systemd.md, Network")
     return plan
@@ -130,15 +153,18 @@ def plan_uninstall(target: Target) -> Plan:
         names = ", ".join(installed.services) or "none"
         raise BadInputError(f"{target.unit} is not installed by this command; installed: {names}")
     plan = Plan()
-    plan.steps.append(RunCommand(target.systemctl("disable", *(("--now",) if target.live else ()), target.unit), may_fail=True))
-    for path, digest in service.files.items():
-        if installed.shared(path, target.unit) or not (target.root / path).exists():
+    left = {unit: one for unit, one in installed.services.items() if unit != target.unit}
+    ended = {target.unit: service}
+    if set(left) == {GATEWAY_UNIT}:  # a gateway to nothing
+        ended[GATEWAY_UNIT] = left.pop(GATEWAY_UNIT)
+    plan.steps.append(RunCommand(target.systemctl("disable", *(("--now",) if target.live else ()), *ended), may_fail=True))
+    for path, digest in ((path, digest) for one in ended.values() for path, digest in one.files.items()):
+        if any(path in one.files for one in left.values()) or not (target.root / path).exists():
             continue
         if sha256((target.root / path).read_bytes()) == digest:
             plan.steps.append(RemoveFile(target.root / path, _kept_folder(target.root, path)))
         else:
             plan.notes.append(f"kept, because it was changed since: {target.root / path}")
-    left = {unit: one for unit, one in installed.services.items() if unit != target.unit}
     record = target.root / RECORD
     if left:
         plan.steps.append(WriteFile(record, Installed(services=left).model_dump_json(indent=2).encode()))
@@ -185,21 +211,35 @@ def _check_executable(executable: Path, must_exist: bool) -> None:
             )
 
 
-def _activation(target: Target) -> list[Step]:
+def _gateway(
+    target: Target, installed: Installed, *, shipped: Path, executable: Path, identity: Path | None, stations: list[Path]
+) -> tuple[dict[str, bytes], InstalledService]:
+    """Return the gateway's files that are to be written, and its record; without an identity the installed one is kept."""
+    template = (shipped / GATEWAY_UNIT).read_text(encoding="utf-8").replace(_SHIPPED_EXECUTABLE, str(executable))
+    unit = {f"{_SYSTEM}/{GATEWAY_UNIT}": gateway_unit(template, stations)}
+    before = installed.services.get(GATEWAY_UNIT, InstalledService(files={}))
+    kept = {path: digest for path, digest in before.files.items() if path.startswith(f"{IDENTITY_DIR}/")}
+    files = unit if identity is None else {**unit, **identity_files(identity)}
+    # A new access list is copied over the old one by hand, too: once the folder is ours, whatever is in it is replaced.
+    _refuse_foreign(target.root, unit if kept else files, installed)
+    return files, InstalledService(files={**kept, **{path: sha256(data) for path, data in files.items()}})
+
+
+def _activation(target: Target, units: tuple[str, ...]) -> list[Step]:
     steps: list[Step] = [
         RunCommand(target.tool("systemd-sysusers", "ghest-rt.conf")),
         RunCommand(target.tool("systemd-tmpfiles", "--create", "ghest-rt.conf")),
     ]
     if not target.live:
-        return [*steps, RunCommand(target.systemctl("enable", target.unit))]
+        return [*steps, RunCommand(target.systemctl("enable", *units))]
     subsystems = (f"--subsystem-match={name}" for name in ("usb", "usb-serial", "tty"))
     return [
         *steps,
         RunCommand(("udevadm", "control", "--reload"), may_fail=True),
         RunCommand(("udevadm", "trigger", "--action=change", *subsystems), may_fail=True),
         RunCommand(("systemctl", "daemon-reload")),
-        RunCommand(("systemctl", "enable", target.unit)),
-        RunCommand(("systemctl", "restart", target.unit)),
+        RunCommand(("systemctl", "enable", *units)),
+        RunCommand(("systemctl", "restart", *units)),
     ]
 
 

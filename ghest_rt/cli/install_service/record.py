@@ -15,12 +15,12 @@ class InstalledService(BaseModel):
 
     Attributes:
         files: SHA-256 of every file written for it, by path under the root.
-        station: Its station file, by path under the root.
+        station: Its station file, by path under the root; None for the gateway.
     """
 
     model_config = ConfigDict(extra="forbid")
     files: dict[str, str]
-    station: str
+    station: str | None = None
 
 
 class Installed(BaseModel):

@@ -31,10 +31,11 @@ class Step(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class WriteFile:
-    """Write a file in one piece, readable by all."""
+    """Write a file in one piece; readable by all, unless `mode` says otherwise."""
 
     path: Path
     data: bytes
+    mode: int = 0o644
 
     @property
     def shown(self) -> str:
@@ -46,8 +47,10 @@ class WriteFile:
         new = self.path.with_name(f".{self.path.name}.new")
         try:
             self.path.parent.mkdir(mode=0o755, parents=True, exist_ok=True)
+            new.unlink(missing_ok=True)
+            new.touch(mode=0o600, exist_ok=False)
             new.write_bytes(self.data)
-            new.chmod(0o644)
+            new.chmod(self.mode)
             new.replace(self.path)
         except OSError as error:
             raise GhestError(f"cannot write {self.path}: {error.strerror or error}{_need_root(error)}") from error
