@@ -19,6 +19,7 @@ _EYE_3 = np.eye(3)
 # Diagonals of blocks in the flat covariance.
 _POSE, _GH, _RATE = (slice(part.start * (SIZE + 1), part.stop * (SIZE + 1), SIZE + 1) for part in (POSES, BOTH_GH, RATES))
 _POSE_RATE = slice(RATES.start, RATES.start + 9 * (SIZE + 1), SIZE + 1)
+_EACH_BODY = np.repeat(np.eye(2), (6, 3), axis=0)
 _RATE_POSE = slice(RATES.start * SIZE, RATES.start * SIZE + 9 * (SIZE + 1), SIZE + 1)
 
 
@@ -35,6 +36,7 @@ class Process:
         self._elbow_in_m1 = elbow_in_m1
         self._memory_s = tuning.rate_memory_s
         self._bridging = tuning.bridging_agility
+        self._jerk_s, self._jerky_agility = tuning.jerk_s, tuning.jerky_agility
         self._density = np.empty(9)
         self._density[ACROMION] = self._density[ARM] = tuning.rotation_density
         self._density[GH] = tuning.position_density
@@ -84,11 +86,12 @@ class Process:
         tau = self._memory_s
         fresh = 0.5 * tau * (1.0 - decay * decay)
         carry = tau * (1.0 - decay)
-        density = doubt * self._density
-        density[:6] *= self._agility(belief, 0, t_ns)
-        density[6:] *= self._agility(belief, 1, t_ns)
+        agility = _EACH_BODY @ (self._agility(belief, 0, t_ns), self._agility(belief, 1, t_ns))
+        density = doubt * self._density * agility
+        # Quick movement is also jerky: part of what a pose does is none of its rate's doing.
+        jerk = (dt * self._jerk_s * self._jerk_s) * (agility / (agility + self._jerky_agility))
         diagonal = belief.P.ravel()
-        diagonal[_POSE] += (tau * tau * (dt - 2.0 * carry + fresh)) * density
+        diagonal[_POSE] += (tau * tau * (dt - 2.0 * carry + fresh) + jerk) * density
         diagonal[_RATE] += fresh * density
         cross = (0.5 * carry * carry) * density
         diagonal[_POSE_RATE] += cross

@@ -10,6 +10,8 @@ class Tuning:
 
     Attributes:
         rate_memory_s: Rates decay to zero with this time constant.
+        jerk_s: Movement at full agility is as jerky as if each acceleration acted at once, for this time.
+        jerky_agility: At this agility, half of that.
         rotation_density: Spectral density of rotational acceleration at agility 1, rad^2/s^3.
         position_density: The same of the GH centre, m^2/s^3.
         least_agility: The agility that remains at rest.
@@ -55,10 +57,16 @@ class Tuning:
         elbow_memory_s: Over which time the elbow's place is averaged after that.
         elbow_m: How far the elbow may wander in camera r1, per axis.
         elbow_lever_m: How much farther per radian that the arm turns there: the patient's axis is beside the exoskeleton's.
+        rhythm_sigma: Standard deviation of how far the scapula turns with the arm, rad per rad.
+        rhythm_memory_s: Over which time that is learned.
+        scapula_wander_rad: How far the scapula turns beyond that.
+        wander_memory_s: For how long.
         axial_noise_rad2_s: Spectral density of the forearm's wander against the arm during movement.
         axial_tolerance_rad: What forearm and m1 may come to disagree by without a slip.
         axial_shift_rad: Standard deviation of a slip of m1 about the arm, if there is one.
         axial_shift_cost: Twice the logarithm of the odds against it.
+        axial_offset_rad: Standard deviation of a turn of m1 about the arm since the calibration, if there is one.
+        axial_offset_cost: Twice the logarithm of the odds against it.
         lag_memory_s: Over which time the lag of m1 behind the axial rotation is learned.
         lag_sigma: Standard deviation of that lag, if there is one, rad per rad.
         lag_tolerance: What the forearm may seem to lead by without a lag.
@@ -66,7 +74,9 @@ class Tuning:
         unknown_arm_length_m: Prior standard deviation of the arm length where it is not calibrated.
     """
 
-    rate_memory_s: float = 1.0
+    rate_memory_s: float = 3.0
+    jerk_s: float = 0.02
+    jerky_agility: float = 1000.0
     rotation_density: float = 2e-5
     position_density: float = 1e-5
     least_agility: float = 0.2
@@ -111,10 +121,16 @@ class Tuning:
     elbow_memory_s: float = 0.3
     elbow_m: float = 0.0025
     elbow_lever_m: float = 0.015
+    rhythm_sigma: float = 0.2
+    rhythm_memory_s: float = 10.0
+    scapula_wander_rad: float = math.radians(2.0)
+    wander_memory_s: float = 0.5
     axial_noise_rad2_s: float = math.radians(0.5) ** 2 * 0.3
     axial_tolerance_rad: float = math.radians(1.0)
     axial_shift_rad: float = math.radians(8.0)
     axial_shift_cost: float = 8.0
+    axial_offset_rad: float = math.radians(5.0)
+    axial_offset_cost: float = 3.0
     lag_memory_s: float = 30.0
     lag_sigma: float = 0.3
     lag_tolerance: float = 0.04
