@@ -14,6 +14,9 @@ _SETTLED = 20  # valid samples in a row
 _SILENCE_NS = 200_000_000  # a subscriber to whom nothing comes for so long knows that something is wrong
 _RATE_HZ = 66.6
 _RECOVERY_S = 15.0
+# Later than this after its beginning no sample may be valid during a fault that leaves a device nothing to say: for so long a
+# forecast is as good as any.
+TELL_NS = 120_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,6 +38,14 @@ class Fault:
     reasons: frozenset[str]
     seconds: float = 1.0
     rigs: tuple[str, ...] = BOTH
+
+    @property
+    def blind(self) -> bool:
+        """Whether a device says nothing true for as long as it lasts."""
+        return self.mode in _BLIND
+
+
+_BLIND = {"swapped", "silent", "unplugged", "garbage", "crc_errors", "bus_off"}
 
 
 def _fault(name: str, devices: str, mode: str, *reasons: str, seconds: float = 1.0, rigs: tuple[str, ...] = BOTH) -> Fault:
@@ -77,6 +88,7 @@ class Seen:
         lost: Slots of the grid without angles, from its beginning to the recovery.
         longest_gap_ms: Longest time in which nothing arrived.
         stale: Samples called valid whose angles are not the truth of their instant.
+        untold: Samples called valid while a device was blind for longer than TELL_NS.
         worst_deg: The largest error among the samples with angles.
         missing: Samples that were sent and never came.
     """
@@ -88,6 +100,7 @@ class Seen:
     detected_ms: float | None
     recovered_ms: float | None
     stale: int
+    untold: int
     worst_deg: float
     missing: int
     lost: int
@@ -134,6 +147,10 @@ def judge(rig: Rig, fault: Fault, window: Window) -> Seen:
         detected_ms=None if not signs else (min(signs) - window.from_ns) * 1e-6,
         recovered_ms=None if recovered_ns is None else max(recovered_ns - window.until_ns, 0) * 1e-6,
         stale=sum(valid and error > WRONG_DEG for valid, error in errors),
+        untold=sum(
+            fault.blind and sample.valid and window.from_ns + TELL_NS < sample.body["t_sample_ns"] < window.until_ns
+            for sample in seen
+        ),
         worst_deg=max((error for _, error in errors), default=0.0),
         missing=_missing(seen),
         lost=max(slots - sum(sample.t_received_ns <= until_ns for sample in with_angles), 0),

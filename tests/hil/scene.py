@@ -1,13 +1,12 @@
 """One simulated scene that feeds all fixtures: images, joint angles and truth on one time axis, for ever to and fro.
 
-World time s runs 0 .. D and back again, the movement with it, but slowing down to a stop before each turn: no arm turns round
-in an instant, and a forecast of one that did would be wrong. World time is a function of the host's monotonic clock alone, so
+World time s runs 0 .. D and back again, the movement with it, which turns round within a tenth of a second, as hard as an arm
+can: one that turned in an instant nothing could forecast. World time is a function of the host's monotonic clock alone, so
 every process that knows the epoch knows what cameras see, what encoders read and what is true at any instant, without talking
 to the others.
 """
 
 import json
-import math
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,6 +17,7 @@ from ghest_drivers.samples import Intrinsics
 FRAME_RATE_HZ = 60
 TRUTH_RATE_HZ = 500
 DURATION_S = 2.0
+TURN_S = 0.1  # from full speed one way to full speed the other way
 DEPTH_UNIT_M = 1e-4  # what an OAK camera sends
 STATION_FILE = "hil-scene.toml"
 
@@ -75,8 +75,13 @@ class Scene:
 
 
 def movement_s(world_s: float) -> float:
-    """Time of the movement at a world time: at rest at both ends, never faster than the movement itself."""
-    return DURATION_S / math.pi * (1.0 - math.cos(math.pi * world_s / DURATION_S))
+    """Time of the movement at a world time: at its own pace, but from rest and to rest at both ends."""
+    half_s = TURN_S / 2.0
+    near_s = min(world_s, DURATION_S - world_s, half_s)
+    slowed_s = near_s * near_s / TURN_S
+    if near_s == half_s:
+        return world_s - half_s / 2.0
+    return slowed_s if world_s < half_s else DURATION_S - half_s - slowed_s
 
 
 def write_scene(folder: Path, epoch_ns: int) -> None:

@@ -68,6 +68,7 @@ def test_a_fault_is_told_and_mended_and_nothing_stale_passes_for_fresh(rig: Rig,
         pytest.skip(f"{rig.name} cannot have it")
     seen = measure(rig, fault)
     assert seen.stale == 0, seen
+    assert seen.untold == 0, seen
     assert seen.missing == 0
     assert seen.recovered_ms is not None and seen.recovered_ms < 8000
     if fault.reasons:
