@@ -103,7 +103,9 @@ class SimCamera:
 
 
 class SimEncoders:
-    """The encoders of a simulated world; an `EncoderLink`. Samples are cheap: late ones are delivered late, none left out.
+    """The encoders of a simulated world; an `EncoderLink`. What was due before it is opened has gone by, as with a real link.
+
+    From then on samples are cheap: late ones are delivered late, none is left out.
 
     Args:
         world: The world.
@@ -131,6 +133,8 @@ class SimEncoders:
     async def open(self) -> None:
         """Start the encoders."""
         self._info = self._world.encoder_info()
+        if not self._is_open:
+            await self._pass_by()
         self._is_open = True
 
     async def read(self, timeout_s: float) -> EncoderSample:
@@ -152,6 +156,15 @@ class SimEncoders:
         """Stop the encoders."""
         self._is_open = False
         self._sleeper.close()
+
+    async def _pass_by(self) -> None:
+        """Leave out what has been due by now."""
+        self._waiting = None
+        while (sample := self._world.encoder_sample(self._next)) is not None:
+            if sample.t_arrival_ns + self._start_ns >= self._clock.now_ns():
+                return
+            self._next += 1
+            await asyncio.sleep(0)
 
     def _simulate(self, info: EncoderInfo) -> EncoderSample:
         sample = self._world.encoder_sample(self._next)

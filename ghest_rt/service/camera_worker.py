@@ -139,9 +139,14 @@ class CameraWorker:
             self._post(self._listener.observed, observation)
 
     def _newest_useful(self, frame: RgbdFrame) -> RgbdFrame:
-        """Pass over frames that have waited too long while a newer one is there: vision is slower than the camera."""
+        """Pass over frames that have waited too long while a newer one is there: vision is slower than the camera.
+
+        Only what waited when it began is passed over: whatever comes meanwhile is the newest there can be, even if it is old,
+        since a camera on a machine that is too busy delivers nothing else.
+        """
         self.counters.count(frame.seq, frame.t_capture_ns)
-        while self._clock.now_ns() - frame.t_arrival_ns > self._settings.max_backlog_ns:
+        t_begin_ns = self._clock.now_ns()
+        while frame.t_arrival_ns <= t_begin_ns and self._clock.now_ns() - frame.t_arrival_ns > self._settings.max_backlog_ns:
             try:
                 newer = self._camera.read(0.0)
             except (ReadTimeout, EndOfStream):

@@ -62,15 +62,16 @@ def test_a_world_too_slow_for_the_clock_loses_frames_and_not_time() -> None:
     assert read == sorted(set(read))
 
 
-async def test_every_encoder_sample_is_delivered_however_late() -> None:
-    clock = VirtualClock(500 * _MS)
+async def test_encoder_samples_that_were_due_before_opening_have_gone_by_and_the_others_come_however_late() -> None:
+    clock = VirtualClock(95 * _MS)
     encoders = SimEncoders(_World(), clock, 0)
     await encoders.open()
-    read = []
+    read = [(await encoders.read(1.0)).seq]
+    clock.sleep_until_ns(500 * _MS)
     with pytest.raises(EndOfStream):
         while True:
             read.append((await encoders.read(1.0)).seq)
-    assert read == list(range(20))
+    assert read == list(range(10, 20))
 
 
 async def test_closed_encoders_leave_no_thread_behind() -> None:
