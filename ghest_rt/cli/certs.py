@@ -156,7 +156,7 @@ def _tell(authority: "Authority", name: str, folder: Path) -> None:
 def _tell_lists(lists: list[Path]) -> None:
     if lists:
         typer.echo(
-            "stations and routers learn of it from their new access list (copy it, then restart the service): "
+            "stations and routers learn of it from their new access list (copy it, then restart the service or the gateway): "
             + ", ".join(map(str, lists)),
         )
 
