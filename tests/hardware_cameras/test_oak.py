@@ -1,5 +1,6 @@
 """The OAK driver's host part on the real SDK: its pipeline, its Sync node, its message types, no device."""
 
+import time
 from collections.abc import Iterator
 from dataclasses import replace
 from datetime import timedelta
@@ -55,6 +56,29 @@ def test_images_arrive_unchanged_with_calibration_and_times(camera: OakCamera, s
     assert info.depth_unit_m == 0.0001
     assert info.color == info.depth == Intrinsics(WIDTH, HEIGHT, 60.0, 61.0, 31.5, 23.5)
     np.testing.assert_array_equal(info.color_from_depth, np.eye(4))
+
+
+class InterruptedClock(MonotonicClock):
+    """Its reader is held up for 20 ms after each of the first few readings, as on a busy machine."""
+
+    def __init__(self, interruptions: int) -> None:
+        self._left = interruptions
+
+    def now_ns(self) -> int:
+        now_ns = super().now_ns()
+        if self._left:
+            self._left -= 1
+            time.sleep(0.02)
+        return now_ns
+
+
+def test_an_interruption_while_clocks_are_compared_does_not_shift_the_frames(source: HostSource) -> None:
+    camera = OakCamera("r1", source, SETTINGS, InterruptedClock(9))
+    camera.open()
+    frame = camera.read(_LONG_S)
+    camera.close()
+    sent_ns = nanoseconds(source.started - timedelta(milliseconds=100))
+    assert abs(frame.t_capture_ns - sent_ns) < 1_000_000
 
 
 def test_without_depth_every_colour_image_is_a_frame(source: HostSource) -> None:

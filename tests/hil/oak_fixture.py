@@ -46,8 +46,7 @@ def here(*, name: str, clock: Clock, mxid: str, **streams: Any) -> RgbdCamera:
             return Images(pipeline, "OAK-D-SR", mxid), sync
 
         def send(self, view: str, index: int, number: int, t_ns: int) -> None:
-            age = timedelta(microseconds=(clock.now_ns() - t_ns) / 1000)
-            stamp = dai.Clock.now() - age
+            stamp = timedelta(microseconds=t_ns / 1000)  # the SDK's host clock is CLOCK_MONOTONIC as well
             self.color.send(image(scene.color[view][index], dai.ImgFrame.Type.RGB888i, number, stamp))
             self.depth.send(image(scene.depth[view][index], dai.ImgFrame.Type.RAW16, number, stamp))
 

@@ -19,6 +19,7 @@ from ghest_drivers.samples import CameraInfo, Intrinsics, RgbdFrame
 
 _POLL = timedelta(milliseconds=100)
 _FIRST_FRAME_NS = 10_000_000_000
+_READINGS = 8
 
 
 class OakCamera(SessionCamera["_Session"]):
@@ -64,9 +65,7 @@ class _Session:
             unknown = CameraInfo(
                 name, images.model, images.serial, size_px, size_px, DEPTH_UNIT_M, np.eye(4), float(settings.rate_hz)
             )
-            sdk_clock: Any = dai.Clock
-            host_offset_ns = clock.now_ns() - nanoseconds(sdk_clock.now())
-            self._converter = GroupConverter(unknown, host_offset_ns, stats)
+            self._converter = GroupConverter(unknown, _sdk_offset_ns(clock), stats)
             self.info = self._first_frame()
         except RuntimeError as error:
             self.close()
@@ -130,6 +129,18 @@ class _Session:
         if not (isinstance(color, dai.ImgFrame) and (depth is None or isinstance(depth, dai.ImgFrame))):
             raise BadDeviceData(f"camera {self._name}: expected images, got {type(color).__name__}, {type(depth).__name__}")
         return self._converter.convert(color, depth, t_arrival_ns)
+
+
+def _sdk_offset_ns(clock: Clock) -> int:
+    """Return host monotonic time less the SDK's host time, from the quickest of some readings: others are interrupted."""
+    sdk_clock: Any = dai.Clock
+    readings = []
+    for _ in range(_READINGS):
+        before_ns = clock.now_ns()
+        sdk_ns = nanoseconds(sdk_clock.now())
+        after_ns = clock.now_ns()
+        readings.append((after_ns - before_ns, (before_ns + after_ns) // 2 - sdk_ns))
+    return min(readings)[1]
 
 
 def connected_camera(name: str, mxid: str, settings: OakSettings, clock: Clock) -> OakCamera:
