@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from ghest_rt.cli.study.running import store_in
+from ghest_rt.cli.study.running import shown_progress, store_in
 from ghest_rt.errors import BadInputError, GhestError
 from ghest_rt.studies.engine.cluster import ClusterExecutor
 from ghest_rt.studies.engine.local import LocalExecutor
@@ -51,6 +51,12 @@ def test_what_is_there_is_not_run_again_and_an_interrupted_study_goes_on_where_i
     assert len(before) == 3
     assert [value["found"] for value in run_tasks(tasks, store, LocalExecutor(1))] == [0, 1, 4, 9, 16, 25]
     assert sorted(runs(log)) == [str(n) for n in range(6)]
+
+
+def test_an_interruption_says_that_nothing_finished_is_lost(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(KeyboardInterrupt), shown_progress("study accuracy"):
+        raise KeyboardInterrupt
+    assert "study accuracy: interrupted; what is finished is kept" in capsys.readouterr().err
 
 
 def test_a_task_that_fails_is_named_and_the_others_are_kept(tmp_path: Path) -> None:

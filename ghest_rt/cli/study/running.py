@@ -32,7 +32,10 @@ def store_in(out: Path) -> ResultStore:
 
 @contextmanager
 def shown_progress(title: str) -> Iterator[Callable[[float, float], None]]:
-    """Show a bar with the time left on standard error, if that is a terminal; yields what to tell (done, total)."""
+    """Show a bar with the time left on standard error, if that is a terminal; yields what to tell (done, total).
+
+    An interruption says that nothing finished is lost.
+    """
     console = Console(stderr=True)
     columns = (
         TextColumn("{task.description}"),
@@ -44,7 +47,13 @@ def shown_progress(title: str) -> Iterator[Callable[[float, float], None]]:
     )
     with Progress(*columns, console=console, disable=not console.is_terminal, transient=True, speed_estimate_period=600) as bar:
         task = bar.add_task(title, total=None)
-        yield lambda done, total: bar.update(task, completed=done, total=total)
+        try:
+            yield lambda done, total: bar.update(task, completed=done, total=total)
+        except KeyboardInterrupt:
+            console.print(
+                f"{title}: interrupted; what is finished is kept, the same command goes on from here", highlight=False
+            )
+            raise
 
 
 def show_end(console: Console, document: Mapping[str, Any], folder: Path) -> None:

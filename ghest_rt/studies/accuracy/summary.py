@@ -111,8 +111,8 @@ def _comb_is_worst(rms: dict[tuple[str, str], float]) -> list[Check]:
     reasons = {
         "marker m1 and the arm": (
             ("m1_m", "position_m", "orientation_deg"),
-            "The largest and fastest movement: markers are seen at steeper angles, and an offset in time costs more. That takes "
-            "the whole movement: in its first seconds COMB is not yet as large, nor as fast.",
+            "The largest and fastest movement: markers are seen at steeper angles, and an offset in time costs more. That "
+            "takes the whole movement: in its first seconds COMB is not yet as large, nor as fast.",
         ),
         "marker m0": (
             ("m0_m",),
