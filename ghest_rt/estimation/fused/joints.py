@@ -24,8 +24,9 @@ _SHARES, _SHARES_OF_TWO = (0.0, 0.5, 1.0), (0.5, 1.0)
 _FOLLOW = 0.04
 # Keeps the weights of forecasts without any error finite, rad^2.
 _LEAST_SQUARE = 1e-14
-# A parabola through three samples, carried on by one step, errs by 4.5 times the error of a sample.
-_ONE_STEP = 20.0
+# Mean square of the error of a parabola through three samples, carried on by one step, per that of a sample: 20 if samples err
+# independently; and movement itself makes more of it than samples do.
+_ONE_STEP = 60.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
