@@ -5,13 +5,13 @@ import logging
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 
 from ghest_drivers.interfaces import EncoderLink, RgbdCamera
 from ghest_drivers.samples import CameraInfo, DeviceVitals, EncoderInfo, EncoderSample, RgbdFrame
 from ghest_rt.errors import DeviceError
-from ghest_rt.messages.published import Event, EventKind, InputState
-from ghest_rt.messages.results import GhEstimate, MarkerObservation, Reason, Status
+from ghest_rt.messages.published import EventKind
+from ghest_rt.messages.results import MarkerObservation, Reason, Status
+from ghest_rt.service.absence import at_the_end, waiting
 from ghest_rt.service.alarm import Alarm, make_alarm
 from ghest_rt.service.camera_worker import CameraWorker, same_camera
 from ghest_rt.service.clocks import ServiceClock
@@ -19,6 +19,7 @@ from ghest_rt.service.compose import AnglesComposer
 from ghest_rt.service.contract import MakePipeline, PipelineLike, ServiceSettings, ServiceSummary
 from ghest_rt.service.drift_watch import DriftWatch
 from ghest_rt.service.encoder_worker import ENCODERS, EncoderWorker
+from ghest_rt.service.events import EventTeller
 from ghest_rt.service.health import HealthMeter, SampleCounts, lateness
 from ghest_rt.service.inputs import Severity
 from ghest_rt.service.outputs import Output
@@ -30,9 +31,6 @@ _log = logging.getLogger(__name__)
 
 _STOP_TIMEOUT_S = 0.7  # SIGTERM must end the service within a second, even if a device hangs in its close
 _HEALTH_PERIOD_NS = 1_000_000_000
-_ABSENT = ((ENCODERS, Reason.ENCODERS_SILENT), ("r0", Reason.R0_NO_FRAMES), ("r1", Reason.R1_NO_FRAMES))
-_CAME_TOO_LATE = {Reason.R0_NO_FRAMES: "r0", Reason.R1_NO_FRAMES: "r1", Reason.ENCODERS_SILENT: None}
-_LEVELS = {"info": logging.INFO, "warning": logging.WARNING, "error": logging.ERROR}
 
 
 class Service:
@@ -83,6 +81,7 @@ class Service:
         self._health_due_ns = 0
         self._told_status: Status | None = None
         self._drift_watch = DriftWatch()
+        self._events = EventTeller(composer, outputs, clock)
 
     @property
     def anchor_ns(self) -> int | None:
@@ -109,7 +108,7 @@ class Service:
         try:
             for worker in self._workers.values():
                 worker.start(loop)
-            self._event(EventKind.STARTED, "info", "service", f"publishing at {self._settings.rate_hz:g} Hz")
+            self._events.tell(EventKind.STARTED, "info", "service", f"publishing at {self._settings.rate_hz:g} Hz")
             self._pacer.start(Grid(t_start_ns, self._settings.rate_hz), self._alarm)
             await self._stopping.wait()
         finally:
@@ -117,7 +116,7 @@ class Service:
             self._alarm.close()
             await self._stop_inputs(encoder_task)
         self._send_health(self._clock.now_ns())
-        self._event(EventKind.STOPPED, "info", "service", f"{self._counts.published} samples published")
+        self._events.tell(EventKind.STOPPED, "info", "service", f"{self._counts.published} samples published")
         if self._failure is not None:
             raise self._failure
         return self.summary()
@@ -140,23 +139,23 @@ class Service:
 
     def input_event(self, source: str, kind: EventKind, severity: Severity, message: str) -> None:
         """Publish what happened to an input."""
-        self._event(kind, severity, source, message)
+        self._events.tell(kind, severity, source, message)
 
     def camera_connected(self, name: str, info: CameraInfo) -> None:
         """Note a camera's facts; the pipeline is (re)built once every input is known."""
-        self._event(EventKind.INPUT_CONNECTED, "info", name, f"{info.model} {info.serial}")
+        self._events.tell(EventKind.INPUT_CONNECTED, "info", name, f"{info.model} {info.serial}")
         known = self._infos.get(name)
         self._infos[name] = info
         if known is not None and not same_camera(known, info):
-            self._event(EventKind.INPUT_CHANGED, "warning", name, "the camera came back with another calibration")
+            self._events.tell(EventKind.INPUT_CHANGED, "warning", name, "the camera came back with another calibration")
             self._drop_pipeline()
         self._prepare()
 
     def encoders_connected(self, info: EncoderInfo) -> None:
         """Note the joints measured; the pipeline is (re)built once every input is known."""
-        self._event(EventKind.INPUT_CONNECTED, "info", ENCODERS, ", ".join(info.joint_names))
+        self._events.tell(EventKind.INPUT_CONNECTED, "info", ENCODERS, ", ".join(info.joint_names))
         if self._joints is not None and self._joints != info.joint_names:
-            self._event(EventKind.INPUT_CHANGED, "warning", ENCODERS, "the link came back with other joints")
+            self._events.tell(EventKind.INPUT_CHANGED, "warning", ENCODERS, "the link came back with other joints")
             self._drop_pipeline()
         self._joints = info.joint_names
         self._prepare()
@@ -254,27 +253,20 @@ class Service:
             self._pacer.stop()
             return
         if self._pipeline is None or self._anchor_ns is None or t_sample_ns < self._anchor_ns:
-            estimate = self._waiting(t_sample_ns)
+            estimate = waiting(t_sample_ns, self._counters, self._last_capture_ns)
         else:
             estimate = self._pipeline.estimate(t_sample_ns)
-        if estimate.reason in _CAME_TOO_LATE and (no_more_frames or _CAME_TOO_LATE[estimate.reason] in self._ended):
-            estimate = replace(estimate, reason=Reason.END_OF_RECORDING)
+        estimate = at_the_end(estimate, self._ended, no_more_frames=no_more_frames)
         message = self._composer.compose(estimate, self._clock.now_ns())
         for output in self._outputs:
             output.angles(message, estimate)
         self._counts.add(estimate)
         for marker, kind, text in self._drift_watch.see(t_sample_ns, estimate.drift):
-            self._event(kind, "warning" if kind is EventKind.MARKER_DRIFTED else "info", marker, text)
+            self._events.tell(kind, "warning" if kind is EventKind.MARKER_DRIFTED else "info", marker, text)
         if t_tick_ns >= self._health_due_ns:
             self._health_due_ns += _HEALTH_PERIOD_NS * (1 + (t_tick_ns - self._health_due_ns) // _HEALTH_PERIOD_NS)
             self._send_health(self._clock.now_ns())
             self._garbage.collect()
-
-    def _waiting(self, t_sample_ns: int) -> GhEstimate:
-        """The estimate until every camera has delivered: none, and which input is waited for."""
-        absent = (reason for name, reason in _ABSENT if self._counters[name].state in (InputState.LOST, InputState.SILENT))
-        reason = next(absent, Reason.STARTING)
-        return GhEstimate(t_sample_ns, Status.LOST, reason, None, None, None, None, None, dict(self._last_capture_ns))
 
     def _send_health(self, t_ns: int) -> None:
         composer = self._composer
@@ -284,24 +276,7 @@ class Service:
         if message.status is not self._told_status and message.reason is not Reason.STARTING:
             self._told_status = message.status
             severity: Severity = "warning" if message.status is Status.LOST else "info"
-            self._event(EventKind.STATUS_CHANGED, severity, "service", f"{message.status} ({message.reason})")
-
-    def _event(self, kind: EventKind, severity: Severity, source: str, text: str) -> None:
-        fields = {"ghest_source": source, "ghest_kind": str(kind)}
-        _log.log(_LEVELS[severity], "%s: %s: %s", source, kind.replace("_", " "), text, extra=fields)
-        t_ns = self._clock.now_ns()
-        message = Event(
-            run_id=self._composer.numbering.run_id,
-            seq=self._composer.numbering.take("events"),
-            t_ns=t_ns,
-            t_unix_ns=self._composer.unix_ns(t_ns),
-            severity=severity,
-            kind=kind,
-            source=source,
-            message=text,
-        )
-        for output in self._outputs:
-            output.event(message)
+            self._events.tell(EventKind.STATUS_CHANGED, severity, "service", f"{message.status} ({message.reason})")
 
     def _fail(self, error: BaseException) -> None:
         if self._failure is None:
