@@ -44,7 +44,7 @@ _USED_BY = {Role.STATION: "[publisher] identity", Role.ROUTER: "ghest-rt gateway
 
 @app.callback()
 def _check_installation() -> None:
-    need_extra("security", "ghest-rt certs")
+    need_extra("security", "an authority")
 
 
 @app.command()
