@@ -35,8 +35,8 @@ def test_replay_json_is_one_document_on_standard_output(ghest_rt: Run, blank: Pa
     assert done.returncode == 0, done.stderr
     (run,) = json.loads(done.stdout)["runs"]
     assert run["source"] == "blank.mcap"
-    # Ticks may be missed before the first frame, too, on a busy machine.
-    assert 20 - run["missed_ticks"] <= run["samples"] - run["starting"] <= 20
+    # On a busy machine ticks are missed, and frames passed over before the first that is used: the grid begins with that one.
+    assert 20 - run["missed_ticks"] - run["skipped_frames"] <= run["samples"] - run["starting"] <= 20
     assert run["valid_fraction"] == 0.0
     assert "samples published" in done.stderr
 
