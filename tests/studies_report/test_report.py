@@ -123,7 +123,8 @@ def test_the_command_tells_what_it_wrote(results: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("value", "text"), [(None, "–"), (0.0042, "0.004"), (0.123, "0.123"), (1.2345, "1.23"), (9.999, "10.0"), (1234.5, "1234")]
+    ("value", "text"),
+    [(None, "–"), (0.0042, "0.0042"), (0.042, "0.042"), (0.123, "0.123"), (1.2345, "1.23"), (9.999, "10.0"), (1234.5, "1234")],
 )
 def test_numbers_have_three_digits_or_so(value: float | None, text: str) -> None:
     assert number(value) == text

@@ -76,7 +76,7 @@ def _table(summary: Row, sensor: str, kind: str) -> Table:
                 *(Cell(number(measured[name]), style) for name, _ in _COLUMNS),
                 Cell(f"{sum(v['fused_wins'] for v in verdicts)} of {len(verdicts)}" if verdicts else ""),
                 Cell(f"{sum(v['fused_wins_when_published'] for v in verdicts)} of {len(verdicts)}" if verdicts else ""),
-                Cell(who["published_short"], "published"),
+                Cell(who["published_short"], "published wide"),
             )
         )
     turned, held, straight = (

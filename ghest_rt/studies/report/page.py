@@ -6,6 +6,8 @@ from pathlib import Path
 
 from ghest_rt.errors import BadInputError
 
+_SMALL = 0.01
+
 
 @dataclass(frozen=True, slots=True)
 class Cell:
@@ -13,7 +15,8 @@ class Cell:
 
     Attributes:
         text: What it says.
-        kind: "" for text, "number", "published" for the paper's or a rival's own figure, "ours" for method `fused`.
+        kind: "" for text, "number", "published" for the paper's or a rival's own figure, "ours" for method `fused`,
+            "behind" for method `fused` where another one does better.
     """
 
     text: str
@@ -129,10 +132,12 @@ def figure_of(path: Path, caption: str, *, folded: bool = False) -> Figure:
 
 
 def number(value: float | None, scale: float = 1.0) -> str:
-    """Return a number with three digits, or a dash."""
+    """Return a number with three digits, fewer below a tenth, or a dash."""
     if value is None:
         return "–"
     scaled = scale * value
     if abs(scaled) >= 99.95:
         return f"{scaled:.0f}"
-    return f"{scaled:#.3g}" if abs(scaled) >= 0.1 else f"{scaled:.3f}"
+    if abs(scaled) >= 0.1:
+        return f"{scaled:#.3g}"
+    return f"{scaled:.3f}" if abs(scaled) >= _SMALL else f"{scaled:.4f}"

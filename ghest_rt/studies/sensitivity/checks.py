@@ -39,7 +39,7 @@ def _at(rows: Sequence[Row], amount: float, column: str, movement: str, marker: 
 
 def _absolute(rows: Sequence[Row], amount: float, column: str, stronger: str) -> Check:
     weaker = "m1" if stronger == "m0" else "m0"
-    what, scale, unit = ("position", 1e3, "mm") if column.startswith("position") else ("orientation", 1.0, "°")
+    what, scale, unit = ("position", 1e3, " mm") if column.startswith("position") else ("orientation", 1.0, "°")
     figures = []
     verdicts = []
     for movement in MOVEMENTS:
@@ -47,8 +47,8 @@ def _absolute(rows: Sequence[Row], amount: float, column: str, stronger: str) ->
         verdicts.append(max(strong) > max(weak))
         means = f"{scale * sum(strong) / len(strong):.2f}, {scale * sum(weak) / len(weak):.2f}"
         figures.append(
-            f"{movement}: worst axis of {stronger} {scale * max(strong):.2f} {unit}, "
-            f"of {weaker} {scale * max(weak):.2f} {unit} (means of the axes {means})"
+            f"{movement}: worst axis of {stronger} {scale * max(strong):.2f}{unit}, "
+            f"of {weaker} {scale * max(weak):.2f}{unit} (means of the axes {means})"
         )
     if what == "position":
         why = (
