@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ghest_drivers.samples import CameraInfo
-from ghest_rt.vision.factory import make_detector
+from ghest_rt.vision.factory import Method, make_detector
 from tests.vision.scenes import (
     MARKER,
     PLATE_RGB,
@@ -28,7 +28,7 @@ _COLOR_NOISE = 4.0  # of 255
 _DEPTH_NOISE_M = 0.0005
 _SENSORS = {"paper": (paper_camera(), (0.14, 0.18, 0.24)), "sr300": (sr300_camera(), (0.22, 0.28, 0.36))}
 _TILTS_DEG = (5.0, 20.0, 40.0)
-_METHODS = ("paper", "aruco", "refined", "photometric")
+_METHODS: tuple[Method, ...] = ("paper", "aruco", "refined", "photometric")
 _STYLES = {"paper": "#999999", "aruco": "#D55E00", "refined": "#56B4E9", "photometric": "#0072B2"}
 _ARC_POINTS = 180
 
@@ -87,14 +87,14 @@ def _depth_information(info: CameraInfo, color_pose: np.ndarray) -> np.ndarray:
     return np.asarray(J.T @ J / (_DEPTH_NOISE_M**2 + info.depth_unit_m**2 / 12.0))
 
 
-def _errors(info: CameraInfo, poses: list[np.ndarray], method: str, rng: np.random.Generator) -> tuple[float, float] | None:
+def _errors(info: CameraInfo, poses: list[np.ndarray], method: Method, rng: np.random.Generator) -> tuple[float, float] | None:
     """Return the RMS errors (degrees, millimetres) at first sight; None if some pose was not found."""
     code = 0 if method == "aruco" else None
     errors = []
     for pose in poses:
         scene = Scene(pose, color_noise=_COLOR_NOISE, depth_noise_m=_DEPTH_NOISE_M, code=code)
         frame = render(scene, info, rng, samples=8)
-        seen = make_detector(method, "r0", "m0", MARKER, info).detect(frame)  # type: ignore[arg-type]
+        seen = make_detector(method, "r0", "m0", MARKER, info).detect(frame)
         if seen.camera_from_marker is None:
             return None
         errors.append(pose_error(seen.camera_from_marker, pose))

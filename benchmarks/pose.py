@@ -10,7 +10,7 @@ from benchmarks.scenes import scene
 from benchmarks.timing import summary_ms
 from ghest_drivers.samples import RgbdFrame
 from ghest_rt.recording.reader import Recording
-from ghest_rt.vision.factory import make_detector
+from ghest_rt.vision.factory import Method, make_detector
 
 _ROUNDS = 3
 
@@ -54,9 +54,9 @@ def _timings(sensor: str, quick: bool) -> dict[str, Any]:
     config = disks.station.config
     results: dict[str, Any] = {"frames": len(disk_frames)}
 
-    def detectors(method: str) -> dict[str, Any]:
+    def detectors(method: Method) -> dict[str, Any]:
         return {
-            name: make_detector(method, name, camera.marker, config.markers[camera.marker], disks.camera_infos[name])  # type: ignore[arg-type]
+            name: make_detector(method, name, camera.marker, config.markers[camera.marker], disks.camera_infos[name])
             for name, camera in config.cameras.items()
         }
 

@@ -18,6 +18,7 @@ from ghest_rt.vision.plate_light import PlateLight
 
 Float32 = NDArray[np.float32]
 Color = tuple[float, float, float]
+Coefficients = tuple[float, float, float, float, float, float]
 Places = list[tuple[float, float]]
 
 _FOREIGN2 = 0.3**2  # squared distance from the mixing line, in units of |disk - plate|, beyond which a pixel is foreign
@@ -93,11 +94,12 @@ class DiskMeter:
         if size > min(height, width):
             return (None,) * 4
         basis, moments = self._grid(half)
-        seen = [_inside(image, place, disk, 1.0 + band) for place, disk in zip(places, predicted.disks, strict=True)]
+        seen = _inside(image, places, predicted, 1.0 + band)
         if not any(seen):
             return (None,) * 4
         corners = []
         offsets = []
+        quadratics = []
         pixels = np.empty((4, size, size, 3), dtype=np.float32)
         for k, (u, v) in enumerate(places):
             left = min(max(round(u) - half, 0), width - size)
@@ -105,33 +107,38 @@ class DiskMeter:
             pixels[k] = image[top : top + size, left : left + size]
             corners.append((left + half, top + half))
             offsets.append((u - left - half, v - top - half))
+            quadratics.append(ellipse_quadratic(predicted.disks[k], *offsets[k]))
 
-        quadratics = [ellipse_quadratic(disk, *offset) for disk, offset in zip(predicted.disks, offsets, strict=True)]
-        quad = np.array(quadratics, dtype=np.float32) @ basis  # 1 on the predicted edges
-        inside = quad < max(1.0 - band, _LEAST_INSIDE) ** 2
-        near = quad < (1.0 + band) ** 2
         rows, bright = self._mixing(predicted, light, offsets)
+        quad, brightness = (np.array(quadratics + bright, dtype=np.float32) @ basis).reshape(2, 4, -1)
+        inside = quad < max(1.0 - band, _LEAST_INSIDE) ** 2  # quad is 1 on the predicted edges
+        near = quad < (1.0 + band) ** 2
         mix = np.array(rows, dtype=np.float32)
         mixed = mix[:, :3].transpose(0, 2, 1) @ pixels.reshape(4, -1, 3).transpose(0, 2, 1)
-        mixed *= (np.array(bright, dtype=np.float32) @ basis[:3])[:, None, :]
+        mixed *= brightness[:, None, :]
         mixed -= mix[:, 3, :, None]
 
-        weight = inside.astype(np.float32)[:, None, :]
-        n_inside = np.maximum(np.add.reduce(weight, axis=2), 1.0)
-        means = (weight @ mixed.transpose(0, 2, 1))[:, 0] / n_inside
+        weight = inside.astype(np.float32)
+        n_inside = np.maximum(weight @ moments[:, :1], 1.0)
+        means = (mixed @ weight[:, :, None])[:, :, 0] / n_inside
         alpha = mixed[:, 0]
         alpha /= np.maximum(means[:, :1], _INSIDE_RANGE[0])
-        filled = alpha * near
-        filled[inside] = 1.0
+        filled = alpha * (near ^ inside)
+        filled += weight
         np.subtract(filled, alpha, out=alpha)  # now zero in the band; inside and outside what the image should not hold
-        distance2 = np.einsum("kcn,kcn->kn", mixed, mixed)
+        squares = mixed * mixed
+        distance2 = squares[:, 0]
+        distance2 += squares[:, 1]
+        distance2 += squares[:, 2]
         foreign = (distance2 > _FOREIGN2) & near
-        n_foreign = np.add.reduce(foreign, axis=1).tolist()
-        if any(n_foreign):
+        n_foreign = [0, 0, 0, 0]
+        if np.count_nonzero(foreign):
+            n_foreign = np.add.reduce(foreign, axis=1).tolist()
             filled[foreign] = quad[foreign] < 1.0
         sums = (filled @ moments).tolist()
         centered = means.tolist()
-        scatter = ((weight @ distance2[:, :, None])[:, 0] / n_inside).tolist()
+        distance2 *= weight
+        scatter = (np.add.reduce(distance2, axis=1, keepdims=True) / n_inside).tolist()
 
         found: list[DiskCenter | None] = []
         for k, disk in enumerate(predicted.disks):
@@ -163,8 +170,8 @@ class DiskMeter:
 
     def _mixing(
         self, predicted: MarkerImage, light: PlateLight, offsets: Places
-    ) -> tuple[list[list[list[float]]], list[tuple[float, float, float]]]:
-        """Return per disk its mixing rows (see `mixing_rows`), and 1 / s as coefficients of the patch's [1, u, v]."""
+    ) -> tuple[list[list[list[float]]], list[Coefficients]]:
+        """Return per disk its mixing rows (see `mixing_rows`), and 1 / s as coefficients of [1, u, v, u^2, u v, v^2]."""
         a, b, c, d = predicted.plate_px
         scale = light.level / (a * d - b * c)
         slope_u, slope_v = scale * (d * light.slope[0] - c * light.slope[1]), scale * (a * light.slope[1] - b * light.slope[0])
@@ -172,21 +179,30 @@ class DiskMeter:
         for (x_m, y_m), (u, v) in zip(self._centers_m, offsets, strict=True):
             inverse = 1.0 / (light.level * (1.0 + x_m * light.slope[0] + y_m * light.slope[1]))
             gu, gv = -slope_u * inverse * inverse, -slope_v * inverse * inverse
-            bright.append((inverse - gu * u - gv * v, gu, gv))
+            bright.append((inverse - gu * u - gv * v, gu, gv, 0.0, 0.0, 0.0))
         return [mixing_rows(light.rgb, relative) for relative in self.relative], bright
 
 
-def _inside(image: NDArray[np.uint8], place: tuple[float, float], disk: DiskImage, reach: float) -> bool:
-    """Whether the ellipse, grown by the factor `reach`, lies wholly in the image."""
-    du, dv = reach * math.sqrt(max(disk.a, 0.0)), reach * math.sqrt(max(disk.c, 0.0))
+def _inside(image: NDArray[np.uint8], places: Places, predicted: MarkerImage, reach: float) -> list[bool]:
+    """Return of each ellipse whether it lies wholly in the image when grown by the factor `reach`."""
     height, width = image.shape[:2]
-    return bool(du <= place[0] <= width - 1 - du and dv <= place[1] <= height - 1 - dv)
+    least = reach * predicted.extent_px
+    (u_0, v_0), (u_1, v_1), (u_2, v_2), (u_3, v_3) = places
+    right, below = max(u_0, u_1, u_2, u_3), max(v_0, v_1, v_2, v_3)
+    if least <= min(u_0, u_1, u_2, u_3, v_0, v_1, v_2, v_3) and right <= width - 1 - least and below <= height - 1 - least:
+        return [True, True, True, True]
+    seen = []
+    for (u, v), disk in zip(places, predicted.disks, strict=True):
+        du, dv = reach * math.sqrt(max(disk.a, 0.0)), reach * math.sqrt(max(disk.c, 0.0))
+        seen.append(du <= u <= width - 1 - du and dv <= v <= height - 1 - dv)
+    return seen
 
 
-def ellipse_quadratic(disk: DiskImage, x: float, y: float) -> tuple[float, float, float, float, float, float]:
+def ellipse_quadratic(disk: DiskImage, x: float, y: float) -> Coefficients:
     """Return (p - o)^T S^-1 (p - o) with o = (x, y) as coefficients of [1, u, v, u^2, u v, v^2]; 1 on the edge."""
-    inverse = 1.0 / max(disk.determinant, 1e-12)
-    a, b, c = disk.c * inverse, -disk.b * inverse, disk.a * inverse
+    a, b, c = disk.c, disk.b, disk.a
+    inverse = 1.0 / max(a * c - b * b, 1e-12)
+    a, b, c = a * inverse, -b * inverse, c * inverse
     au, av = a * x + b * y, b * x + c * y
     return (x * au + y * av, -2.0 * au, -2.0 * av, a, 2.0 * b, c)
 

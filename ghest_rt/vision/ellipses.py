@@ -64,15 +64,16 @@ def marker_image(H: Array, centers_m: list[list[float]], radius_m: float, optics
         optics: The colour camera's lens.
     """
     disks = []
+    rows = H.tolist()
     for x_m, y_m in centers_m:
-        found = ellipse(H, x_m, y_m, radius_m)
+        found = ellipse(rows, x_m, y_m, radius_m)
         if found is None:
             return None
         x, y, sxx, sxy, syy = found
         u, v, ux, uy, vx, vy = optics.place(x, y)
         pxx, pxy, pyx, pyy = ux * sxx + uy * sxy, ux * sxy + uy * syy, vx * sxx + vy * sxy, vx * sxy + vy * syy
         disks.append(DiskImage(u, v, pxx * ux + pxy * uy, pxx * vx + pxy * vy, pyx * vx + pyy * vy))
-    (h00, h01, h02), (h10, h11, h12), (h20, h21, h22) = H.tolist()
+    (h00, h01, h02), (h10, h11, h12), (h20, h21, h22) = rows
     x, y = h02 / h22, h12 / h22
     _, _, ux, uy, vx, vy = optics.place(x, y)
     xX, xY, yX, yY = (h00 - x * h20) / h22, (h01 - x * h21) / h22, (h10 - y * h20) / h22, (h11 - y * h21) / h22
@@ -84,9 +85,18 @@ def marker_image(H: Array, centers_m: list[list[float]], radius_m: float, optics
     )
 
 
-def ellipse(H: Array, x_m: float, y_m: float, radius_m: float) -> tuple[float, float, float, float, float] | None:
-    """Return (c_x, c_y, S_xx, S_xy, S_yy) of a disk's image in rays; None if it reaches behind the camera."""
-    (h00, h01, h02), (h10, h11, h12), (h20, h21, h22) = H.tolist()
+def ellipse(
+    rows: list[list[float]], x_m: float, y_m: float, radius_m: float
+) -> tuple[float, float, float, float, float] | None:
+    """Return (c_x, c_y, S_xx, S_xy, S_yy) of a disk's image in rays; None if it reaches behind the camera.
+
+    Args:
+        rows: The three rows of the homography from plate coordinates (metres) to rays.
+        x_m: Centre of the disk in the plate.
+        y_m: Centre of the disk in the plate.
+        radius_m: Its radius.
+    """
+    (h00, h01, h02), (h10, h11, h12), (h20, h21, h22) = rows
     mx, my, mz = h00 * x_m + h01 * y_m + h02, h10 * x_m + h11 * y_m + h12, h20 * x_m + h21 * y_m + h22
     r2 = radius_m * radius_m
     gxx, gxy, gyy = r2 * (h00 * h00 + h01 * h01), r2 * (h00 * h10 + h01 * h11), r2 * (h10 * h10 + h11 * h11)

@@ -12,6 +12,7 @@ from ghest_rt.vision.optics import Optics
 _OUTLIER = 0.12  # relative brightness beside the fitted plane
 _MIN_SAMPLES = 8
 _CLIPPED = 251.0
+_ONES = np.ones(3)
 _MIN_LEVEL = 24.0  # sum of the three channels below which the plate is too dark to be told from anything
 
 
@@ -47,20 +48,21 @@ class PlateSampler:
     def __call__(self, image: NDArray[np.uint8], H: Array) -> PlateLight | None:
         """Return the light on the plate that homography H (3, 3) puts into the image; None where no plate is to be seen."""
         points = H @ self._points
-        pixels = np.rint(self._optics.pixels((points[:2] / points[2]).T)).astype(np.intp)
+        places = self._optics.pixels((points[:2] / points[2]).T)
         design, solve = self._design, self._solve
-        (u_low, v_low), (u_high, v_high) = pixels.min(axis=0).tolist(), pixels.max(axis=0).tolist()
-        if u_low < 0 or v_low < 0 or u_high >= self._optics.width_px or v_high >= self._optics.height_px:
-            inside = (pixels >= 0).all(axis=1) & (pixels < (self._optics.width_px, self._optics.height_px)).all(axis=1)
+        width, height = self._optics.width_px, self._optics.height_px
+        u, v = np.rint(places.T).astype(np.intp)
+        if u.view(np.uintp).max() >= width or v.view(np.uintp).max() >= height:  # what is negative is huge without its sign
+            inside = (u >= 0) & (v >= 0) & (u < width) & (v < height)
             if np.count_nonzero(inside) < _MIN_SAMPLES:
                 return None
-            pixels, design = pixels[inside], design[inside]
+            u, v, design = u[inside], v[inside], design[inside]
             solve = np.linalg.pinv(design)
-        rgb = image[pixels[:, 1], pixels[:, 0]].astype(np.float64)
-        sums = np.add.reduce(rgb, axis=1)
+        rgb = image.reshape(-1, 3).take(v * width + u, axis=0).astype(np.float64)
+        sums = rgb @ _ONES
         plane = solve @ sums
-        good = np.abs(sums - design @ plane) < _OUTLIER * abs(plane[0])
-        if not good.all():
+        off = np.abs(sums - design @ plane)
+        if not float(off.max()) < _OUTLIER * abs(float(plane[0])):
             middle = np.median(sums)
             good = np.abs(sums - middle) < 2 * _OUTLIER * middle
             for _ in range(2):

@@ -28,6 +28,7 @@ _FLOOR_COUNTS = 1.5  # no pixel is an outlier for being this near
 _MAX_SAMPLES = 3600
 _MIXED_PX = 1.2  # pixels along the plate's edge that may see past it
 _SHIFT_BITS = 4
+_NOWHERE = 1e9  # 1/m
 _GRAZING = 0.05  # sine of the least angle between plate and line of sight
 
 Float32 = NDArray[np.float32]
@@ -66,6 +67,9 @@ class PlateDepth:
         self._corners = np.sign(layout.corners_m)
         rays = ray_grid(info.depth)
         self._basis = np.stack([rays[..., 0], rays[..., 1], np.ones(rays.shape[:2])]).astype(np.float32)
+        # Of every count the inverse depth, quicker looked up than divided; of what was not measured one beyond any gate.
+        counts = np.arange(1, 1 << 16)
+        self._inverse_depth = np.concatenate([[_NOWHERE], 1.0 / (self._unit_m * counts)]).astype(np.float32)
 
     def fit(self, depth_counts: NDArray[np.uint16], depth_from_marker: Array, gates_m: tuple[float, ...]) -> Plane | None:
         """Return the plane in the depth camera's frame, or None if too little of the plate was measured.
@@ -81,8 +85,7 @@ class PlateDepth:
             return None
         rows, columns, mask = region
         basis = self._basis[:, rows, columns].reshape(3, -1)
-        counts = depth_counts[rows, columns].ravel()
-        usable = mask & (counts > 0)
+        inverse = self._inverse_depth.take(depth_counts[rows, columns]).ravel()
         wanted = max(int(np.count_nonzero(mask)), 1)
 
         n, p_m = depth_from_marker[:3, 2], depth_from_marker[:3, 3]
@@ -91,11 +94,10 @@ class PlateDepth:
             return None
         slope = 1.0 / (depth_m * depth_m)  # inverse metres per metre of depth
         theta = n / distance_m
-        inverse = np.float32(1.0 / self._unit_m) / np.maximum(counts, 1).astype(np.float32)
         residual = inverse - theta.astype(np.float32) @ basis
         least = max(_MIN_PIXELS, round(_MIN_SHARE * wanted))
         floor = _FLOOR_COUNTS * self._unit_m * slope
-        fitted = _fit_correction(basis, residual, usable, [gate_m * slope for gate_m in gates_m], floor, least=least)
+        fitted = _fit_correction(basis, residual, mask, [gate_m * slope for gate_m in gates_m], floor, least=least)
         if fitted is None:
             return None
         covariance = fitted.inverse_normal * max(fitted.variance, (_ROUNDING * self._unit_m * slope) ** 2)
@@ -138,7 +140,7 @@ class _Correction:
 def _fit_correction(
     basis: Float32, residual: Float32, usable: NDArray[np.bool_], gates: list[float], floor: float, *, least: int
 ) -> _Correction | None:
-    """Fit change . (x, y, 1) to the residuals (n,) of inverse depth, outliers left out; None if too few pixels stay."""
+    """Fit change . (x, y, 1) to the residuals (n,) of usable inverse depths, outliers left out; None if too few pixels stay."""
     change = np.zeros(3)
     for step in range(len(gates) + _MORE_FITS):
         used = (np.abs(residual) < gates[step]) & usable

@@ -55,6 +55,15 @@ class PoseFit:
     deviations: Array
     sigma: Array
 
+    @staticmethod
+    def guess(R: Array, p_m: Array) -> "PoseFit":
+        """Return a pose of which nothing is known."""
+        return PoseFit(R, p_m, np.zeros((6, 6)), 0.0, 0.0, 0.0, np.zeros(0), np.zeros(0))
+
+    def moved(self, R: Array, p_m: Array, information: Array) -> "PoseFit":
+        """Return the fit with another pose and its information; what is known of the misfit stays."""
+        return PoseFit(R, p_m, information, self.center_chi2, self.plane_chi2, self.plane_off, self.deviations, self.sigma)
+
     @property
     def chi2(self) -> float:
         """Squared deviations over their variances, all together."""
@@ -82,7 +91,7 @@ def fit_pose(R: Array, p_m: Array, centers: Centers, plane: Plane | None, max_st
     Returns:
         The fit, or None if it is singular or leaves the space before the camera.
     """
-    weights = np.repeat(1.0 / centers.sigma, 2)
+    weights = (1.0 / centers.sigma).repeat(2)
     plane_information = np.zeros((3, 3)) if plane is None else inverse_of(plane.covariance)
     if plane_information is None:
         return None
@@ -144,8 +153,9 @@ def plane_terms(R: Array, p_m: Array, plane: Plane) -> tuple[Array, Array]:
 
 def _center_terms(R: Array, p_m: Array, places: list[list[float]], radius_m: float) -> tuple[Array, Array] | None:
     """Return predicted rays (2n,) and their Jacobian (2n, 6); the bias is part of the prediction, not of the Jacobian."""
-    H = np.column_stack([R[:, 0], R[:, 1], p_m])
-    (h00, h01, px), (h10, h11, py), (h20, h21, pz) = H.tolist()
+    (h00, h01, _), (h10, h11, _), (h20, h21, _) = R.tolist()
+    px, py, pz = p_m.tolist()
+    H = [[h00, h01, px], [h10, h11, py], [h20, h21, pz]]
     predicted: list[float] = []
     rows: list[list[float]] = []
     for x_m, y_m in places:

@@ -1,7 +1,6 @@
 """Method `refined`: sub-pixel disks and the depth plane fused into one pose with its covariance (docs/vision.md)."""
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +21,7 @@ from ghest_rt.vision.optics import Optics
 from ghest_rt.vision.planar_pose import Pose, homography, pose_on_plane, poses_of_homography
 from ghest_rt.vision.plate_light import PlateLight, PlateSampler
 from ghest_rt.vision.plate_plane import Plane, PlateDepth
+from ghest_rt.vision.pose_fit import PoseFit
 from ghest_rt.vision.sighting import Polish, Sighting
 from ghest_rt.vision.small import inverse_of
 from ghest_rt.vision.solve import Solution, Solver
@@ -37,7 +37,10 @@ _COLD_GATES_M = (0.02, 0.006)
 _PLANE_FLOOR = 5e-5  # of theta, relative: what no number of pixels averages out
 _MOTION_DOUBT = 0.15  # share of the motion between colour and depth image that may be wrong
 _SURE_SHARE = 0.85
+_REACH_PX = 0.6  # by which a better pose may move the edges of the one found
+_FORETOLD_REACH_PX = 0.3  # and those of the one foretold
 _NEUTRAL = (1.0, 1.0, 1.0)
+_IDENTITY = np.eye(3)
 
 
 class RefinedDetector:
@@ -134,9 +137,14 @@ class RefinedDetector:
         measured = self._look(frame.color_rgb, predicted[:3, [0, 1, 3]], _BAND_PX)
         if isinstance(measured, MarkerStatus):
             return Solution(measured)
-        centers = self._solver.centers(measured)
-        plane = self._plane(frame, predicted, _TRACKED_GATES_M) if len(centers.sigma) >= 2 else None
-        solution = self._solver.track(centers, plane, (predicted[:3, :3], predicted[:3, 3]))
+        seen = sum(disk is not None for disk in measured)
+        plane = self._plane(frame, predicted, _TRACKED_GATES_M) if seen >= 2 else None
+        start = predicted[:3, :3], predicted[:3, 3]
+        fit = self._foretold(frame, measured, plane, start)
+        if fit is not None:
+            self._learn(measured)
+            return Solution(MarkerStatus.OK, fit, seen)
+        solution = self._solver.track(self._solver.centers(measured), plane, start)
         if solution.fit is not None:
             self._learn(measured)
         return self._polished(frame, measured, plane, solution)
@@ -192,8 +200,17 @@ class RefinedDetector:
         if self._light is None or self._predicted is None:
             return solution
         used = plane if solution.status is MarkerStatus.OK else None
-        fit = self._polish(Sighting(frame.color_rgb, self._predicted, measured, self._light, used, solution.fit))
-        return solution if fit is None else replace(solution, fit=fit)
+        fit = self._polish(Sighting(frame.color_rgb, self._predicted, measured, self._light, used, solution.fit, _REACH_PX))
+        return solution if fit is None else Solution(solution.status, fit, solution.disks)
+
+    def _foretold(self, frame: RgbdFrame, measured: DiskCenters, plane: Plane | None, start: Pose) -> PoseFit | None:
+        """Return the pose made better straight from the prediction, or None if the disks' centres have to be solved first."""
+        if self._polish is None or self._light is None or self._predicted is None:
+            return None
+        if not self._solver.foretold(measured, self._predicted, plane, start):
+            return None
+        guess = PoseFit.guess(*start)
+        return self._polish(Sighting(frame.color_rgb, self._predicted, measured, self._light, plane, guess, _FORETOLD_REACH_PX))
 
     def _cold_pair(self, frame: RgbdFrame, constellation: Constellation) -> Solution:
         """Solve from two disks on the plane that depth shows around them."""
@@ -239,9 +256,9 @@ class RefinedDetector:
         if dt_s or not self._same_place:
             moved = then @ inverse(predicted)
             floor += _MOTION_DOUBT * float(np.abs(then[:3, 3] - predicted[:3, 3]).max()) / float(predicted[2, 3])
-            floor += _MOTION_DOUBT * float(np.abs(moved[:3, :3] - np.eye(3)).max())
+            floor += _MOTION_DOUBT * float(np.abs(moved[:3, :3] - _IDENTITY).max())
             plane = plane.seen_from(self._depth_from_color @ moved)
-        covariance = plane.covariance + np.eye(3) * (floor * floor * float(plane.theta @ plane.theta))
+        covariance = plane.covariance + _IDENTITY * (floor * floor * float(plane.theta @ plane.theta))
         return Plane(plane.theta, covariance, plane.share)
 
     def _cold_plane(self, frame: RgbdFrame, starts: tuple[Pose, Pose]) -> Plane | None:

@@ -24,6 +24,7 @@ class Sighting:
         light: The light on the plate.
         plane: The plate's plane in the colour camera at the colour image's time; None where depth takes no part.
         fit: The pose found.
+        reach_px: By how much a better pose may move an edge.
     """
 
     image: NDArray[np.uint8]
@@ -32,6 +33,7 @@ class Sighting:
     light: PlateLight
     plane: Plane | None
     fit: PoseFit
+    reach_px: float
 
 
 class Polish(Protocol):

@@ -8,6 +8,7 @@ import numpy as np
 
 from ghest_rt.messages.results import MarkerStatus
 from ghest_rt.vision.disk_centers import DiskCenters
+from ghest_rt.vision.ellipses import MarkerImage
 from ghest_rt.vision.layout import MarkerLayout
 from ghest_rt.vision.optics import Optics
 from ghest_rt.vision.planar_pose import Pose, mirrored
@@ -25,6 +26,8 @@ _TIGHT = 8.0  # squared deviations per degree of freedom above which something m
 _EXPECTED = 3.0  # squared deviations per degree of freedom that noise explains
 _CLEARLY = 6.0  # how much better a fit must be for a disk to be left out
 _LEAST_DROP_PX = 0.1  # and how far off a centre must be
+_FORETOLD_PX = 0.08  # a prediction is good if every disk is so near to where it puts it
+_FORETOLD_PLANE_OFF = 0.01  # and theta, relative
 _SAME_POSE_RAD = 0.06
 _TELL_APART_CHI2 = 16.0
 _RANGE_M = (0.03, 2.0)
@@ -58,7 +61,23 @@ class Solver:
         places = np.array([(disk.u, disk.v) for _, disk in seen]).reshape(-1, 2)
         rays = self._optics.disk_rays(places, np.array([[disk.radius2_px] for _, disk in seen]).reshape(-1, 1))
         sigma = [math.hypot(_SIGMA_FLOOR_PX, _SIGMA_FACTOR * disk.sigma_px) / self._optics.mean_focal_px for _, disk in seen]
-        return Centers(self._layout.centers_m[[k for k, _ in seen]], rays, np.array(sigma), self._layout.radius_m)
+        plate_m = self._layout.centers_m
+        if len(seen) < len(plate_m):
+            plate_m = plate_m[[k for k, _ in seen]]
+        return Centers(plate_m, rays, np.array(sigma), self._layout.radius_m)
+
+    def foretold(self, measured: DiskCenters, predicted: MarkerImage, plane: Plane | None, start: Pose) -> bool:
+        """Whether all four disks and the plane are where a prediction puts them, so that nothing contradicts it."""
+        R, p_m = start
+        depth_m = float(p_m[2])
+        if plane is None or not _RANGE_M[0] <= depth_m <= _RANGE_M[1]:
+            return False
+        for seen, disk in zip(measured, predicted.disks, strict=True):
+            if seen is None or abs(seen.u - disk.u) > _FORETOLD_PX or abs(seen.v - disk.v) > _FORETOLD_PX:
+                return False
+        theta = R[:, 2] / (R[:, 2] @ p_m)
+        off = plane.theta - theta
+        return float(off @ off) < _FORETOLD_PLANE_OFF**2 * float(theta @ theta) and float(theta[2]) > 0.0
 
     def track(self, centers: Centers, plane: Plane | None, start: Pose) -> Solution:
         """Solve from a pose predicted by earlier frames."""
@@ -136,7 +155,8 @@ class Solver:
 
     def _plausible(self, fit: PoseFit) -> bool:
         limit = _MAX_DEVIATION_PX / self._optics.mean_focal_px
-        return bool((np.maximum(fit.deviations - _MAX_DEVIATION_SIGMAS * fit.sigma, 0.0) < limit).all()) and fit.faces_camera
+        beyond = fit.deviations - _MAX_DEVIATION_SIGMAS * fit.sigma
+        return float(beyond.max()) < limit and fit.faces_camera
 
     def _checked(self, fit: PoseFit, status: MarkerStatus, disks: int) -> Solution:
         if not _RANGE_M[0] <= float(fit.p_m[2]) <= _RANGE_M[1]:

@@ -6,14 +6,17 @@ import cv2
 import numpy as np
 import pytest
 
+from ghest_rt.geometry.so3 import exp_so3
 from ghest_rt.messages.results import MarkerStatus
 from ghest_rt.vision.factory import make_detector
 from ghest_rt.vision.photometric.edge_profile import PIXEL_VARIANCE, EdgeProfile
+from ghest_rt.vision.solve import Solver
 from tests.vision.scenes import (
     MARKER,
     Blob,
     Scene,
     error_vector,
+    facing_pose,
     paper_camera,
     pose_error,
     random_pose,
@@ -115,10 +118,52 @@ def test_the_same_frames_give_the_same_poses_after_a_reset():
 @pytest.mark.parametrize("angle_deg", [0.0, 20.0, 45.0])
 def test_the_profile_has_the_pixel_s_and_the_blur_s_variance_whatever_the_direction(blur_px, angle_deg):
     distance_px = np.linspace(-3.999, 3.999, 4000)
-    sine2 = np.full(4000, np.sin(2 * np.deg2rad(angle_deg)))
-    covered, slope, _ = EdgeProfile(blur_px)(distance_px, sine2)
+    half_sine2 = np.full(4000, 0.5 * np.sin(2 * np.deg2rad(angle_deg)))
+    covered, slope, _ = EdgeProfile(blur_px)(distance_px, half_sine2)
     density = -slope / -slope.sum()
     assert covered[0] == pytest.approx(1.0, abs=1e-3)
     assert covered[-1] == pytest.approx(0.0, abs=1e-3)
     assert density @ distance_px == pytest.approx(0.0, abs=0.01)
     assert density @ distance_px**2 == pytest.approx(PIXEL_VARIANCE + blur_px**2, rel=0.02)
+
+
+@pytest.mark.parametrize("info", [paper_camera(), sr300_camera()], ids=["paper", "sr300"])
+def test_from_a_good_prediction_it_finds_the_pose_that_it_finds_from_the_centres(info, monkeypatch):
+    rng = np.random.default_rng(68)
+    pose, frames = random_pose(rng, (0.2, 0.24), max_tilt_deg=25.0), []
+    for k in range(6):
+        pose[:3, :3] = exp_so3(np.array([0.006, -0.004, 0.003])) @ pose[:3, :3]
+        pose[:3, 3] += (0.0002, 0.0003, -0.0004)
+        frames.append(render(Scene(pose, **NOISE), info, rng, seq=k, t_ns=k * 16_000_000, samples=4))
+    solved = []
+    whole = Solver.track
+    monkeypatch.setattr(Solver, "track", lambda *arguments: solved.append(1) or whole(*arguments))
+
+    def tracked():
+        solved.clear()
+        detector = make_detector("photometric", "r0", "m0", MARKER, info)
+        return [detector.detect(frame) for frame in frames], len(solved)
+
+    straight, how_often = tracked()
+    monkeypatch.setattr(Solver, "foretold", lambda *_: False)
+    by_centres, always = tracked()
+    assert how_often < always == len(frames) - 1
+    apart = []
+    for one, other in zip(straight[1:], by_centres[1:], strict=True):
+        away = error_vector(one.camera_from_marker, other.camera_from_marker)
+        apart.append(away @ np.linalg.solve(other.covariance, away))
+    assert np.mean(apart) < 1.0  # noise displaces both by 6
+
+
+def test_a_disk_that_is_not_where_it_was_foretold_is_left_to_the_solver(monkeypatch):
+    rng = np.random.default_rng(69)
+    still = render(Scene(facing_pose(0.3, 0.4, 0.2, [0.0, 0.0, 0.16])), paper_camera(), rng)
+    moved = render(Scene(facing_pose(0.3, 0.4, 0.2, [0.001, 0.0, 0.16])), paper_camera(), rng, seq=1, t_ns=16_000_000)
+    solved = []
+    whole = Solver.track
+    monkeypatch.setattr(Solver, "track", lambda *arguments: solved.append(1) or whole(*arguments))
+    detector = make_detector("photometric", "r0", "m0", MARKER, paper_camera())
+    detector.detect(still)
+    seen = detector.detect(moved)
+    assert len(solved) == 1
+    assert pose_error(seen.camera_from_marker, facing_pose(0.3, 0.4, 0.2, [0.001, 0.0, 0.16]))[1] < 0.02

@@ -39,18 +39,17 @@ class Edges:
 
     Attributes:
         distance_px: (n,) distance from the edge, positive outside the disk.
-        jacobian: (6, n) its derivative by rotation (rad) and translation (m) of the plate, in plate axes.
-        curvature: (n,) of the edge, 1/px.
+        jacobian: (6, n) its derivative by rotation (rad) about x, -y and z and translation (m) of the plate, in plate axes.
         normal: (2, n) direction across the edge in the image, outwards.
         curvature: (n,) of the edge, 1/px.
-        sine2: (n,) |sin 2t| of the direction t of the normal.
+        half_sine2: (n,) |sin 2t| / 2 of the direction t of the normal.
     """
 
     distance_px: Array
     jacobian: Array
     normal: Array
     curvature: Array
-    sine2: Array
+    half_sine2: Array
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -82,37 +81,45 @@ class EdgePixels:
         px, py, pz = (p_m @ R).tolist()  # in plate axes; p_z is the distance of the camera from the plane
         if abs(pz) < 1e-6:
             return None
-        # (x, y, 1) Z = X r1 + Y r2 + p, and 1/Z = r3 . (x, y, 1) / p_z
-        G = R.T.copy()
-        G[2] /= pz
-        G[0] -= px * G[2]
-        G[1] -= py * G[2]
+        # (x, y, 1) Z = X r1 + Y r2 + p, and 1/Z = r3 . (x, y, 1) / p_z: the homography's rows for X, Y and 1,
+        # and between them those for -(X + p_x) / p_z and -(Y + p_y) / p_z, which are Z times rows of R^T.
+        r1, r2, r3 = R.T
+        inverse = 1.0 / pz
+        G = np.empty((5, 3))
+        np.multiply(r3, inverse, out=G[4])
+        np.subtract(r1, px * G[4], out=G[0])
+        np.subtract(r2, py * G[4], out=G[1])
+        np.multiply(R.T[:2], -inverse, out=G[2:4])
         hom = G @ self.rays
-        depth_m = np.reciprocal(hom[2])
-        place = hom[:2] * depth_m
-        k = np.empty((3, len(depth_m)))
+        plate = hom[:4] / hom[4]
+        place = plate[:2]
+        count = place.shape[1]
+        k = np.empty((3, count))
         n = k[:2]
         np.subtract(place, self.centers_m, out=n)
-        rho = np.sqrt(n[0] * n[0] + n[1] * n[1])
+        square = n * n
+        rho = np.sqrt(square[0] + square[1])
         n /= rho
-        np.add((place[0] + px) * n[0], (place[1] + py) * n[1], out=k[2])
-        k[2] *= -1.0 / pz
+        np.multiply(n, plate[2:], out=square)
+        np.add(square[0], square[1], out=k[2])
         normal = R[:2] @ k
-        inverse = np.reciprocal(np.sqrt(normal[0] * normal[0] + normal[1] * normal[1]))
-        normal *= inverse
-        inverse *= self.focal_px
-        scale = inverse * hom[2]  # pixels per metre across the edge
-        jacobian = np.empty((6, len(depth_m)))
+        np.multiply(normal, normal, out=square)
+        length = np.sqrt(square[0] + square[1])
+        normal /= length
+        scale = hom[4] / length
+        scale *= self.focal_px  # pixels per metre across the edge
+        jacobian = np.empty((6, count))
         np.multiply(k, -scale, out=jacobian[3:])
-        np.multiply(place[1], jacobian[5], out=jacobian[0])
-        np.multiply(place[0], -jacobian[5], out=jacobian[1])
-        np.subtract(place[0] * jacobian[4], place[1] * jacobian[3], out=jacobian[2])
-        inverse *= depth_m
-        curvature = inverse * inverse * inverse
+        np.multiply(place[::-1], jacobian[5], out=jacobian[:2])
+        np.multiply(place, jacobian[4:2:-1], out=square)
+        np.subtract(square[0], square[1], out=jacobian[2])
+        length *= hom[4]
+        curvature = self.focal_px / length
+        curvature *= curvature * curvature
         curvature *= 1.0 / (pz * pz * self.mean_focal_px**4 * self.radius_m)  # det G = 1 / p_z
         rho -= self.radius_m
         rho *= scale
-        return Edges(rho, jacobian, normal, curvature, np.abs(2.0 * normal[0] * normal[1]))
+        return Edges(rho, jacobian, normal, curvature, np.abs(normal[0] * normal[1]))
 
 
 class EdgePixelSampler:
@@ -124,7 +131,7 @@ class EdgePixelSampler:
         self._optics = optics
         self._rays = optics.ray_table()
         self._mosaic = MosaicSense()
-        self._patches: dict[int, tuple[NDArray[np.intp], Float32]] = {}
+        self._patches: dict[int, tuple[NDArray[np.intp], NDArray[np.intp], Float32]] = {}
         margin_m = layout.half_plate_m - float(np.abs(layout.centers_m).max()) - layout.radius_m
         self._widest = 1.0 + _OF_MARGIN * margin_m / layout.radius_m
 
@@ -145,25 +152,31 @@ class EdgePixelSampler:
         width, height = self._optics.width_px, self._optics.height_px
         if 2 * half + 1 > min(width, height):
             return None
-        grid, basis = self._patch(half)
-        quadratics, bright, middles = [], [], []
+        offsets, owners, basis = self._patch(half)
+        middle2, width2 = 0.5 * (outer * outer + inner * inner), 0.5 * (outer * outer - inner * inner)
+        light = sighting.light
+        slope_u, slope_v = _brightness_slope(light, predicted)
+        shapes, bright, middles = [], [], []
         for k, disk in seen:
             u, v = min(max(round(disk.u), half), width - 1 - half), min(max(round(disk.v), half), height - 1 - half)
             middles.append(v * width + u)
-            quadratics.append(ellipse_quadratic(predicted.disks[k], disk.u - u, disk.v - v))
-            bright.append(_brightness(sighting.light, predicted, self._centers_m[k], (disk.u - u, disk.v - v)))
-        quad = np.array(quadratics, dtype=np.float32) @ basis
-        near = np.flatnonzero((quad > np.float32(inner * inner)) & (quad < np.float32(outer * outer)))
-        owner, local = np.divmod(near, len(grid))
-        index = np.array(middles).take(owner) + grid.take(local)
-        brightness = (np.array(bright, dtype=np.float32) @ basis[:3]).take(near)
-        bounds = np.searchsorted(owner, np.arange(len(seen) + 1)).tolist()
+            right, down = disk.u - u, disk.v - v
+            first, *others = ellipse_quadratic(predicted.disks[k], right, down)
+            shapes.append((first - middle2, *others))
+            x_m, y_m = self._centers_m[k]
+            here = light.level * (1.0 + x_m * light.slope[0] + y_m * light.slope[1])
+            bright.append((here - slope_u * right - slope_v * down, slope_u, slope_v, 0.0, 0.0, 0.0))
+        quad, brightness = (np.array(shapes + bright, dtype=np.float32) @ basis).reshape(2, -1)
+        (near,) = (np.abs(quad, out=quad) < np.float32(width2)).nonzero()
+        owner = owners.take(near)
+        index = np.add.outer(middles, offsets).take(near)
+        bounds = near.searchsorted([n * len(offsets) for n in range(len(seen) + 1)]).tolist()
         self._learn(sighting, half)
         numbers = [k for k, _ in seen]
-        excess, contrast = self._colors(sighting, index, owner, brightness, numbers)
+        excess, contrast, centers_m = self._colors(sighting, index, owner, brightness.take(near), numbers)
         return EdgePixels(
             rays=self._rays.take(index, axis=1),
-            centers_m=self._layout.centers_m[numbers].T.take(owner, axis=1),
+            centers_m=centers_m,
             spans=[slice(first, last) for first, last in itertools.pairwise(bounds)],
             excess=excess,
             contrast=contrast,
@@ -172,13 +185,18 @@ class EdgePixelSampler:
             radius_m=self._layout.radius_m,
         )
 
-    def _patch(self, half: int) -> tuple[NDArray[np.intp], Float32]:
-        """Return a square patch around its middle: flat indices (n,) and [1, u, v, u^2, u v, v^2] (6, n)."""
+    def _patch(self, half: int) -> tuple[NDArray[np.intp], NDArray[np.intp], Float32]:
+        """Return a square patch around its middle.
+
+        Returns:
+            (n,) flat indices, (4 n,) which of four patches in a row a pixel belongs to, and (6, n) [1, u, v, u^2, u v, v^2].
+        """
         if half not in self._patches:
             line = np.arange(-half, half + 1)
             v, u = (axis.ravel() for axis in np.meshgrid(line, line, indexing="ij"))
             basis = np.stack([np.ones_like(u), u, v, u * u, u * v, v * v]).astype(np.float32)
-            self._patches[half] = (v * self._optics.width_px + u, basis)
+            owners = np.repeat(np.arange(len(self._centers_m)), len(u))
+            self._patches[half] = (v * self._optics.width_px + u, owners, basis)
         return self._patches[half]
 
     def _learn(self, sighting: Sighting, half: int) -> None:
@@ -190,8 +208,8 @@ class EdgePixelSampler:
 
     def _colors(
         self, sighting: Sighting, index: NDArray[np.intp], owner: NDArray[np.intp], brightness: Float32, seen: list[int]
-    ) -> tuple[Array, Array]:
-        """Return what the pixels show beyond the plate's colour along the step to the disk's, and that step's size.
+    ) -> tuple[Array, Array, Array]:
+        """Return what the pixels show beyond the plate's colour along the step to the disk's, its size, and the centres.
 
         Args:
             sighting: Image, light and colours.
@@ -200,26 +218,34 @@ class EdgePixelSampler:
             brightness: (n,) of the plate at the pixels.
             seen: Numbers of the disks seen.
         """
-        steps = [_step(sighting.light, disk.relative) for k in seen if (disk := sighting.measured[k]) is not None]
+        steps = [
+            (*_step(sighting.light, disk.relative), *self._centers_m[k])
+            for k in seen
+            if (disk := sighting.measured[k]) is not None
+        ]
         channels = self._mosaic.channels
         if channels is None:
-            table = [(x / size, y / size, z / size, level, size) for (x, y, z), level, size in steps]
+            table = [(r / size, g / size, b / size, level, size, x, y) for (r, g, b), level, size, x, y in steps]
             kind = owner
         else:
             # What was interpolated says nothing new: of every pixel the one colour that was measured.
             plate = sighting.light.rgb
-            table = [(float(c == 0), float(c == 1), float(c == 2), plate[c], step[c]) for step, _, _ in steps for c in range(3)]
+            table = [
+                (float(c == 0), float(c == 1), float(c == 2), plate[c], step[c], x, y)
+                for step, _, _, x, y in steps
+                for c in range(3)
+            ]
             row, column = np.divmod(index, self._optics.width_px)
             kind = 3 * owner + channels[row & 1, column & 1]
-        red, green, blue, level, size = np.array(table).T.take(kind, axis=1)
+        known = np.array(table).T.take(kind, axis=1)
+        level, size = known[3:5]
+        known[3:5] *= brightness
         pixels = sighting.image.reshape(-1, 3).take(index, axis=0)
-        shown = pixels[:, 0] * red
-        shown += pixels[:, 1] * green
-        shown += pixels[:, 2] * blue
-        level *= brightness
+        shown = pixels[:, 0] * known[0]
+        shown += pixels[:, 1] * known[1]
+        shown += pixels[:, 2] * known[2]
         shown -= level
-        size *= brightness
-        return shown, size
+        return shown, size, known[5:]
 
     def _scales(self, sighting: Sighting, seen: list[int], owner: NDArray[np.intp]) -> Array | float:
         """Return the scale from rays to pixels: of each disk's pixels where the lens is curved, else one for all."""
@@ -233,16 +259,12 @@ class EdgePixelSampler:
         return np.array(scales).take(owner)
 
 
-def _brightness(
-    light: PlateLight, predicted: MarkerImage, place_m: tuple[float, float], place_px: tuple[float, float]
-) -> tuple[float, float, float]:
-    """Return the plate's brightness as coefficients of [1, u, v] of a patch that shows a point of the plate at a place."""
-    (x_m, y_m), (u, v) = place_m, place_px
+def _brightness_slope(light: PlateLight, predicted: MarkerImage) -> tuple[float, float]:
+    """Return how the plate's brightness changes per pixel to the right and down."""
     a, b, c, d = predicted.plate_px
     scale = light.level / (a * d - b * c)
-    slope_u, slope_v = scale * (d * light.slope[0] - c * light.slope[1]), scale * (a * light.slope[1] - b * light.slope[0])
-    middle = light.level * (1.0 + x_m * light.slope[0] + y_m * light.slope[1])
-    return middle - slope_u * u - slope_v * v, slope_u, slope_v
+    slope_x, slope_y = light.slope
+    return scale * (d * slope_x - c * slope_y), scale * (a * slope_y - b * slope_x)
 
 
 def _step(light: PlateLight, relative: Color) -> tuple[Color, float, float]:

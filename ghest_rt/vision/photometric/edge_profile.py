@@ -17,7 +17,8 @@ import numpy as np
 from ghest_rt.geometry.so3 import Array
 
 REACH_PX = 4.0
-BLURS_PX = tuple(round(0.08 * k, 2) for k in range(1, 15))
+_BLURS_APART_PX = 0.08
+BLURS_PX = tuple(round(_BLURS_APART_PX * k, 2) for k in range(1, 15))
 PIXEL_VARIANCE = 1.0 / 12.0
 _STEPS_PER_PX = 128
 _DIRECTIONS = 12
@@ -42,22 +43,26 @@ class EdgeProfile:
         widening = (_coverage(blur_px + _BLUR_STEP_PX) - _coverage(blur_px - _BLUR_STEP_PX)) / (2 * _BLUR_STEP_PX)
         self._table = np.stack([covered.ravel(), slope.ravel(), widening.ravel()])
 
-    def __call__(self, distance_px: Array, sine2: Array) -> Array:
+    def __call__(self, distance_px: Array, half_sine2: Array) -> Array:
         """Return (3, n): coverage, its derivative by distance, its derivative by blur.
 
         Args:
             distance_px: (n,) distance of pixels from the edge, positive outside; within `REACH_PX`.
-            sine2: (n,) |sin 2t| of the direction t of the edge's normal.
+            half_sine2: (n,) |sin 2t| / 2 = |cos t sin t| of the direction t of the edge's normal.
         """
-        place = (distance_px * _STEPS_PER_PX + (REACH_PX * _STEPS_PER_PX + 0.5)).astype(np.intp)
+        steps = distance_px * _STEPS_PER_PX
+        steps += REACH_PX * _STEPS_PER_PX + 0.5
+        place = steps.astype(np.intp)
         place *= _DIRECTIONS
-        place += (sine2 * (_DIRECTIONS - 1) + 0.5).astype(np.intp)
-        return np.asarray(self._table.take(place, axis=1, mode="clip"), dtype=np.float64)
+        np.multiply(half_sine2, 2.0 * (_DIRECTIONS - 1), out=steps)
+        steps += 0.5
+        place += steps.astype(np.intp)
+        return self._table.take(place, axis=1, mode="clip")
 
 
 def profile_of(blur_px: float) -> EdgeProfile:
     """Return the profile whose blur comes nearest."""
-    return _profile_at(min(range(len(BLURS_PX)), key=lambda k: abs(BLURS_PX[k] - blur_px)))
+    return _profile_at(min(max(round(blur_px / _BLURS_APART_PX) - 1, 0), len(BLURS_PX) - 1))
 
 
 @lru_cache(maxsize=len(BLURS_PX))
