@@ -31,6 +31,8 @@ from ghest_rt.geometry.so3 import Array
 # Two outliers that differ by less than this show the same new place of a marker.
 _SAME_RAD = math.radians(1.0)
 _SAME_M = 0.003
+# A marker contradicts the other where the normalised square (3 degrees of freedom) of the GH centre's innovation is above this.
+_CONTRADICTION = 30.0
 # Normalised innovations squared, per degree of freedom, above this are more than noise.
 _USUAL_NIS = 1.5
 # Shares of a surge, tried one after the other.
@@ -104,7 +106,7 @@ class FusedFilter:
         if not update.nis <= self._tuning.gate:
             streak = _streak(belief.streaks[which], sighting.t_ns, innovation.residual)
             belief.streaks = _with(belief.streaks, which, streak)
-            if self._has_jumped(streak, sighting.t_ns):
+            if self._has_jumped(belief, streak, foretold, sighting.t_ns):
                 outcome = Outcome.JUMP
                 moved = _moved_base(belief, which, sighting.pose, foretold.spread)
                 belief.base = _with(belief.base, which, moved)
@@ -163,8 +165,16 @@ class FusedFilter:
         belief.slack = min(max(belief.slack * math.exp(push), 1.0), tuning.most_slack)
         belief.strain = _with(belief.strain, which, place)
 
-    def _has_jumped(self, streak: Streak, t_ns: int) -> bool:
-        return streak.count >= self._tuning.jump_count and t_ns - streak.since_ns >= self._tuning.jump_span_ns
+    def _has_jumped(self, belief: Belief, streak: Streak, foretold: "_Update", t_ns: int) -> bool:
+        """Return whether a marker that is seen where nobody expected it has moved on its bone, and not the bone with it.
+
+        The bone's movement, however quick, is no news about the GH centre, which the other marker shows too. A marker that says
+        otherwise has moved; or one that has turned while the exoskeleton stands still.
+        """
+        if streak.count < self._tuning.jump_count or t_ns - streak.since_ns < self._tuning.jump_span_ns:
+            return False
+        place = foretold.place_surprise()
+        return float(place @ place) > _CONTRADICTION or belief.speed_rad_s < self._tuning.still_rad_s
 
     def _freed(self, P: Array, which: int, *, everything: bool) -> Array:
         """Return P for a marker whose orientation is open; with `everything`, also the GH centre in it; else its rates."""
@@ -223,9 +233,10 @@ class _Update:
 
 
 def _streak(streak: Streak, t_ns: int, residual: Array) -> Streak:
+    # Compared with the first: a body that moves on leaves it behind, slowly or not.
     apart = residual - streak.residual
     if streak.count and np.linalg.norm(apart[:3]) < _SAME_RAD and np.linalg.norm(apart[3:]) < _SAME_M:
-        return Streak(streak.count + 1, streak.length + 1, streak.since_ns, residual)
+        return Streak(streak.count + 1, streak.length + 1, streak.since_ns, streak.residual)
     return Streak(1, streak.length + 1, t_ns, residual)
 
 
