@@ -17,6 +17,7 @@ from ghest_rt.security.session import session_settings
 
 _SILENT_AFTER_S = 3.0  # health comes once a second
 _KEPT_EVENTS = 3
+_KEPT = {Kind.TOKEN, Kind.TOKEN_GONE, Kind.HEALTH, Kind.EVENT}
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,7 +93,7 @@ class StationWatch:
                 self._troubles.pop(arrival.endpoint, None)
             elif arrival.kind is Kind.DISCONNECTED:
                 self._troubles[arrival.endpoint] = arrival.payload.decode()
-            elif arrival.station:
+            elif arrival.kind in _KEPT:
                 before = self._stations.get(arrival.station, StationState())
                 self._stations[arrival.station] = self._with(before, arrival)
 

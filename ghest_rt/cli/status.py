@@ -59,8 +59,8 @@ def _wait_for_all(known: StationWatch, wait_s: float, stop: StopSignals) -> None
     """Wait until every station that is alive has told its health; one that hangs never does."""
     deadline_s = time.monotonic() + wait_s
     while time.monotonic() < deadline_s and not stop.is_set():
-        stations = known.stations().values()
-        if stations and all(state.health is not None for state in stations if state.alive):
+        alive = [state for state in known.stations().values() if state.alive]
+        if alive and all(state.health is not None for state in alive):
             return
         time.sleep(_POLL_S)
 
