@@ -42,9 +42,31 @@ _FRAMES_PER_BURST = 3
 _SEED = 11
 
 
-def bursts(sensor: SensorName, texts: tuple[str, ...], marker: Literal["disks", "aruco"], count: int) -> Iterator[Burst]:
-    """Yield camera, marker's name, marker, frames and the true pose (4, 4) in the last of them, `count` times per camera."""
-    options = SimulateOptions(out=_OUT, movement="COMB", sensor=sensor, seed=_SEED, marker=marker, imaging=parse_imaging(texts))
+def bursts(
+    sensor: SensorName,
+    texts: tuple[str, ...],
+    marker: Literal["disks", "aruco"],
+    count: int,
+    duration_s: float | None = None,
+) -> Iterator[Burst]:
+    """Yield camera, marker's name, marker, frames and the true pose (4, 4) in the last of them, `count` times per camera.
+
+    Args:
+        sensor: The sensor simulated.
+        texts: Faults of the images, as `ghest-rt simulate --image` takes them.
+        marker: The marker's texture.
+        count: Bursts per camera, evenly spread.
+        duration_s: How much of the movement they are spread over; None for all of it.
+    """
+    options = SimulateOptions(
+        out=_OUT,
+        movement="COMB",
+        sensor=sensor,
+        seed=_SEED,
+        duration_s=duration_s,
+        marker=marker,
+        imaging=parse_imaging(texts),
+    )
     world = build_world(options)
     config = world.station.config
     for name, camera in config.cameras.items():
@@ -74,7 +96,7 @@ def errors(method: Method, given: list[Burst]) -> tuple[Array, list[float]]:
 
 def run(quick: bool) -> dict[str, Any]:
     """Return RMS degrees and millimetres and mean NEES per sensor, fault and method; draw out/benchmarks/imaging.png."""
-    count = 4 if quick else 30
+    count = 4 if quick else 10
     results: dict[str, Any] = {"poses per cell": 2 * count}
     figure = Figure(figsize=(11.0, 7.0), layout="constrained")
     axes = figure.subplots(2, len(SENSORS), sharex=True)

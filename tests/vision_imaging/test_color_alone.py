@@ -16,7 +16,7 @@ from tests.vision.scenes import MARKER, Scene, paper_camera, pose_error, random_
 )
 def test_a_tracked_marker_does_not_flip(info, distance_m, limit_deg) -> None:
     rng = np.random.default_rng(5)
-    for _ in range(4):
+    for _ in range(3):
         pose = random_pose(rng, distance_m, max_tilt_deg=10.0)
         detector = make_detector("photometric", "r0", "m0", MARKER, info, color_only=True)
         for k in range(3):
