@@ -32,7 +32,7 @@ from ghest_rt.geometry.so3 import Array
 _SAME_RAD = math.radians(1.0)
 _SAME_M = 0.003
 # A marker contradicts the other where the normalised square (3 degrees of freedom) of the GH centre's innovation is above this.
-_CONTRADICTION = 30.0
+_CONTRADICTION = 8.0
 # Normalised innovations squared, per degree of freedom, above this are more than noise.
 _USUAL_NIS = 1.5
 # Shares of a surge, tried one after the other.
@@ -106,7 +106,7 @@ class FusedFilter:
         if not update.nis <= self._tuning.gate:
             streak = _streak(belief.streaks[which], sighting.t_ns, innovation.residual)
             belief.streaks = _with(belief.streaks, which, streak)
-            if self._has_jumped(belief, streak, foretold, sighting.t_ns):
+            if self._has_jumped(belief, streak, update, sighting.t_ns):
                 outcome = Outcome.JUMP
                 moved = _moved_base(belief, which, sighting.pose, foretold.spread)
                 belief.base = _with(belief.base, which, moved)
@@ -165,15 +165,15 @@ class FusedFilter:
         belief.slack = min(max(belief.slack * math.exp(push), 1.0), tuning.most_slack)
         belief.strain = _with(belief.strain, which, place)
 
-    def _has_jumped(self, belief: Belief, streak: Streak, foretold: "_Update", t_ns: int) -> bool:
+    def _has_jumped(self, belief: Belief, streak: Streak, surged: "_Update", t_ns: int) -> bool:
         """Return whether a marker that is seen where nobody expected it has moved on its bone, and not the bone with it.
 
         The bone's movement, however quick, is no news about the GH centre, which the other marker shows too. A marker that says
-        otherwise has moved; or one that has turned while the exoskeleton stands still.
+        otherwise, more than a surge explains, has moved; or one that has turned while the exoskeleton stands still.
         """
         if streak.count < self._tuning.jump_count or t_ns - streak.since_ns < self._tuning.jump_span_ns:
             return False
-        place = foretold.place_surprise()
+        place = surged.place_surprise()
         return float(place @ place) > _CONTRADICTION or belief.speed_rad_s < self._tuning.still_rad_s
 
     def _freed(self, P: Array, which: int, *, everything: bool) -> Array:
