@@ -81,6 +81,15 @@ def test_a_key_of_somebody_else_is_not_overwritten(install: Install, root: Path,
     assert key.read_text() == "theirs"
 
 
+def test_a_station_with_its_identity_beside_it_is_pointed_to_the_gateway(install: Install, root: Path, tmp_path: Path) -> None:
+    other = other_station(tmp_path / "other")
+    other.write_text(other.read_text().replace("[publisher]", '[publisher]\nidentity = "station.bed-2"'))
+    done = install("--station", other)
+    assert done.returncode == 2
+    assert "--gateway" in done.stderr
+    assert files_in(root) == set()
+
+
 def test_an_identity_that_nobody_connects_to_is_refused(install: Install, root: Path, authority: Authority) -> None:
     therapy = authority.issue(Role.THERAPY, "game-1", [], 10)
     done = install("--station", STATION, "--gateway", therapy)

@@ -25,6 +25,12 @@ def station_files(path: Path) -> tuple[StationConfig, dict[str, bytes]]:
         if device.backend == "replay":
             raise BadInputError(f"{path}: {key}.backend is replay; a service runs on devices")
         named.extend((f"{key}.{field}", str(getattr(device, field))) for field in ("dbc", "path") if hasattr(device, field))
+    identity = config.publisher.identity
+    if identity is not None and not PurePosixPath(identity).is_absolute():
+        raise BadInputError(
+            f"{path}: publisher.identity = {identity!r}: a private key is not copied along; give the folder's absolute path "
+            "(docs/systemd.md, Network), or leave it out and install a gateway: --gateway FOLDER"
+        )
     for key, name in named:
         relative = PurePosixPath(name)
         if relative.is_absolute():
