@@ -32,9 +32,7 @@ def load_identity(folder: Path, now: datetime | None = None) -> Identity:
     """
     now = datetime.now(UTC) if now is None else now
     if not (folder / CERTIFICATE_FILE).exists():
-        raise BadInputError(
-            f"{folder}: no identity here; name a folder that ghest-rt certs issue made"
-        )
+        raise BadInputError(f"{folder}: no identity here; name a folder that ghest-rt certs issue made")
     authority = load_certificate(folder / CA_FILE)
     path = folder / CERTIFICATE_FILE
     certificate = load_certificate(path)
