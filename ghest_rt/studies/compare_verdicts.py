@@ -41,13 +41,14 @@ def verdict(
     Args:
         who: The contender.
         theirs: Its RMS errors by quantity, degrees; NaN where nothing was judged.
-        fused: Those of `fused`.
+        fused: Those of `fused`; NaN likewise.
         lag_ms: How long after an instant the contender's answer is published.
         simple_forecast_deg: How far off the better of two simple forecasts is, one image ahead of the exact truth.
     """
     if math.isnan(theirs["orientation_deg"]):
         return Verdict(True, True, (), f"fused wins: {who.title} has no answer at all")
-    lost = tuple(name for name in _JUDGED if fused[name] >= theirs[name])
+    # An answer that fused does not have (NaN) is lost, too.
+    lost = tuple(name for name in _JUDGED if not (math.isnan(theirs[name]) or fused[name] < theirs[name]))
     published = fused["published_deg"] < theirs["published_deg"]
     figures = f"{_deg(fused['orientation_deg'])} against {_deg(theirs['orientation_deg'])}"
     if not lost:
@@ -77,4 +78,6 @@ def _unforeseen(fused_deg: float, simple_forecast_deg: float) -> str:
 
 
 def _deg(value: float) -> str:
+    if math.isnan(value):
+        return "no answer"
     return f"{value:.3f} deg" if value < 1.0 else f"{value:.2f} deg"

@@ -131,6 +131,14 @@ def test_a_row_that_is_lost_names_what_the_other_has_on_its_side() -> None:
 def test_who_never_answers_has_lost() -> None:
     silent = dict.fromkeys(FUSED, math.nan)
     assert verdict(CONTENDERS["aruco"], silent, FUSED, 45.0, 0.01).fused_wins
+    ours = verdict(CONTENDERS["aruco"], WORSE, silent, 45.0, 0.01)
+    assert not ours.fused_wins
+    assert not ours.fused_wins_when_published
+    assert "rotation no answer against" in ours.verdict
+    flexion = {**FUSED, "flexion_deg": math.nan}
+    assert verdict(
+        CONTENDERS["aruco"], {**WORSE, "flexion_deg": math.nan}, flexion, 45.0, 0.01
+    ).fused_wins  # near its singularity
 
 
 def test_every_contender_says_what_its_publication_reports_and_what_to_bear_in_mind() -> None:
