@@ -10,7 +10,8 @@ import pytest
 from ghest_drivers.samples import EncoderSample
 from ghest_rt.geometry.so3 import log_so3
 from ghest_rt.messages.results import MarkerObservation, Status
-from tests.estimation_fused.stand import MS, START, Judged, Trial, estimator_for, events, pose
+from tests.estimation_fused.stand import MS, START, Blind, Judged, Trial, estimator_for, events, pose
+from tests.estimation_fused.stand import run as stand_run
 
 Sample = MarkerObservation | EncoderSample
 Arrivals = list[tuple[int, Sample]]
@@ -135,3 +136,13 @@ def test_valid_samples_hold_what_their_sigma_promises() -> None:
     ratios = np.array([one.error_deg / one.sigma_deg for one in judged])
     assert np.mean(ratios < 2.0) > 0.93
     assert ratios.max() < 5.0
+
+
+@pytest.mark.parametrize("marker", ["m0", "m1"])
+def test_the_first_sightings_after_an_outage_are_not_valid_yet(marker: str) -> None:
+    """One sighting tells where a marker is, not how fast it moves."""
+    trial = Trial(duration_s=4.0, angles=abrupt, blind=(Blind(marker, 1.5, 2.5, frames=False),))
+    judged = [one for one in stand_run(trial) if one.t_s > 2.4]
+    first = valid(judged)[0]
+    assert 2.5 + 0.02 + 2.0 / trial.rate_hz < first.t_s < 2.7
+    assert max(one.error_deg for one in valid(judged)) < WRONG_DEG

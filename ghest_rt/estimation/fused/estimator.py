@@ -105,6 +105,8 @@ class FusedEstimator:
         else:
             self._timeline.add(sighting)
             belief = self._timeline.belief_at(sighting.t_ns)
+            if belief is not None and belief.seen_ns[which] == sighting.t_ns:
+                self._freshness.took(which, sighting.t_ns)
             if which and belief is not None and sighting.t_ns - self._compared_ns >= _COMPARE_NS:
                 self._compared_ns = sighting.t_ns
                 self._compare_elbow(belief, sighting)
@@ -146,7 +148,7 @@ class FusedEstimator:
         elbow = self._chain.elbow_angles(e_from_arm, joints.positions, posture.covariance[ARM, ARM])
         flagged = drift.m0.flagged or drift.m1.flagged
         unsettled = belief.slack > _SETTLED_SLACK or math.sqrt(float(np.trace(covariance))) > self._unsettled_rad
-        bridged = bool(stale) or encoders_overdue(joints.gap_ns)
+        bridged = bool(stale) or self._freshness.returning() or encoders_overdue(joints.gap_ns)
         reason = self._weakness(gh_from_arm, covariance, bridged, flagged and unsettled)
         return GhEstimate(
             t_sample_ns=t_ns,

@@ -13,6 +13,8 @@ _JITTER_NS = 8_000_000
 # A sighting older than this, and than so many frame periods, is too old even if frames have come late for long: a machine that
 # is always busy is no slow camera.
 _OLDEST_NS, _OLDEST_FRAMES = 80_000_000, 3
+# One sighting after an outage tells where a marker is, only the next ones how fast it moves.
+_SIGHTINGS = 3
 
 
 class Freshness:
@@ -27,6 +29,8 @@ class Freshness:
         self._patience_ns = [8 * period // 5 for period in period_ns]
         self._oldest_ns = [max(_OLDEST_NS, _OLDEST_FRAMES * period) for period in period_ns]
         self._latency_ns: list[float | None] = [None] * len(period_ns)
+        self._taken_ns: list[int | None] = [None] * len(period_ns)
+        self._in_a_row = [_SIGHTINGS] * len(period_ns)
 
     def saw(self, which: int, latency_ns: int) -> None:
         """Note how long after its capture a frame of marker `which` arrived."""
@@ -36,6 +40,17 @@ class Freshness:
         else:
             follow = _FOLLOW_UP if latency_ns > known else _FOLLOW
             self._latency_ns[which] = known + follow * (latency_ns - known)
+
+    def took(self, which: int, t_ns: int) -> None:
+        """Note that the filter has taken a sighting of marker `which`, captured at `t_ns`."""
+        before_ns = self._taken_ns[which]
+        follows = before_ns is None or t_ns - before_ns <= self._oldest_ns[which]
+        self._in_a_row[which] = self._in_a_row[which] + 1 if follows else 1
+        self._taken_ns[which] = t_ns if before_ns is None else max(t_ns, before_ns)
+
+    def returning(self) -> bool:
+        """Return whether a marker has been seen too few times since it was out of sight: its speed is not known yet."""
+        return min(self._in_a_row) < _SIGHTINGS
 
     def stale(self, seen_ns: Sequence[int], t_ns: int) -> tuple[int, ...]:
         """Return the markers whose newest sighting is older than latency and frame rate account for, or than any may be.
