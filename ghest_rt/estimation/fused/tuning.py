@@ -113,7 +113,7 @@ class Tuning:
     calibrated_m: float = 1e-3
     calibrated_rad: float = math.radians(0.3)
     exact_m: float = 1e-5
-    exact_rad: float = math.radians(0.002)
+    exact_rad: float = math.radians(0.005)
     slide_cost: float = 12.0
     turn_cost: tuple[float, float] = (15.0, 13.5)
     axial_memory_s: float = 1.0
