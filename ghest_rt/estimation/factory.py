@@ -6,6 +6,7 @@ from typing import Literal
 from ghest_rt.config.station import StationConfig
 from ghest_rt.estimation.arm_chain import CAMERAS, ArmChain
 from ghest_rt.estimation.fused.estimator import FusedEstimator
+from ghest_rt.estimation.fused.reference import Reference
 from ghest_rt.estimation.interface import GhEstimator
 from ghest_rt.estimation.paper import PaperEstimator
 from ghest_rt.estimation.refined import RefinedEstimator
@@ -43,5 +44,6 @@ def make_estimator(
     if chosen == "paper":
         return PaperEstimator(chain, max_gap_ns, period_ns)
     if chosen == "fused":
-        return FusedEstimator(chain, max_gap_ns, period_ns, arm_length_m=config.calibration.arm_length_m)
+        reference = Reference.of(config.calibration)
+        return FusedEstimator(chain, max_gap_ns, period_ns, arm_length_m=config.calibration.arm_length_m, reference=reference)
     return RefinedEstimator(chain, max_gap_ns, period_ns, config.estimator.encoder_pairing)

@@ -7,10 +7,11 @@ second option of Wu et al. 2005 for the humerus' axes). It is known to a few deg
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ghest_rt.estimation.fused.reference import Reference
 from ghest_rt.estimation.fused.settled import Settled
 from ghest_rt.estimation.fused.tuning import Tuning
 from ghest_rt.geometry.so3 import Array, quat_wxyz_from_matrix
@@ -29,6 +30,9 @@ class Slip:
         shift_rad: Slip since the beginning that no rotation explains.
         shift_variance: Of that, rad^2.
         shifted: Probability that there is such a shift.
+        offset_rad: Slip since the calibration that was there from the beginning.
+        offset_variance: Of that, rad^2.
+        offset_there: Probability that there is one.
     """
 
     lag: float = 0.0
@@ -36,18 +40,33 @@ class Slip:
     shift_rad: float = 0.0
     shift_variance: float = 0.0
     shifted: float = 0.0
+    offset_rad: float = 0.0
+    offset_variance: float = 0.0
+    offset_there: float = 0.0
 
     def at(self, twist_rad: float) -> tuple[float, float]:
         """Return slip (rad) and its variance (rad^2) where m1 shows an axial rotation of `twist_rad`."""
-        return self.lag * twist_rad + self.shift_rad, self.lag_variance * twist_rad**2 + self.shift_variance
+        slip = self.lag * twist_rad + self.shift_rad + self.offset_rad
+        return slip, self.lag_variance * twist_rad**2 + self.shift_variance + self.offset_variance
+
+    def explained(self, share: float) -> "Slip":
+        """Return the slip when a share of what was there from the beginning is a turn of m1 that has been taken out already."""
+        left = 1.0 - share
+        return replace(self, offset_rad=left * self.offset_rad, offset_variance=left * self.offset_variance)
 
 
 class AxialJudge:
     """Regresses the disagreement between forearm and m1 on the axial rotation; slip there is only if the data insist."""
 
-    def __init__(self, tuning: Tuning) -> None:
-        """Start without samples."""
+    def __init__(self, tuning: Tuning, reference: Reference | None = None) -> None:
+        """Start without samples.
+
+        Args:
+            tuning: Priors.
+            reference: The calibration session.
+        """
         self._tuning = tuning
+        self._reference = reference or Reference()
         # Disagreement of forearm and m1, and the twist that m1 shows.
         self._settled = Settled(2, tuning.reference_s, tuning.axial_memory_s)
         # Integrals of the rapid parts: twist^2 and twist * disagreement, rad^2 s.
@@ -89,7 +108,31 @@ class AxialJudge:
             shift, shift_variance, shifted = _judged(
                 apart - lag * twist, tuning.axial_tolerance_rad**2, tuning.axial_shift_rad**2, tuning.axial_shift_cost
             )
-        self.slip = Slip(lag, lag_variance, shift, shift_variance, shifted)
+        self.slip = Slip(lag, lag_variance, shift, shift_variance, shifted, *self._offset())
+
+    def turned(self) -> tuple[float, float] | None:
+        """Return how far m1 has turned about the arm since the calibration, and the variance (rad, rad^2); None if unknown."""
+        if self._reference.forearm_rad is None or not self._settled.started:
+            return None
+        apart, twist = self._settled.first.tolist()
+        variance = self._reference.forearm_sigma_rad**2 + self._tuning.axial_tolerance_rad**2
+        return self._reference.forearm_rad - (apart - self.slip.lag * twist), variance
+
+    def _offset(self) -> tuple[float, float, float]:
+        """Return the slip that was there from the beginning, its variance (rad, rad^2) and probability.
+
+        What the forearm tells is hardly more certain than what it is to show. The slip is taken out only as far as it is
+        likelier than not; its variance says that it may be there all the same.
+        """
+        turned = self.turned()
+        if turned is None:
+            return 0.0, 0.0, 0.0
+        found, noise = -turned[0], turned[1]
+        prior = self._tuning.axial_offset_rad**2
+        mean, there = found * prior / (noise + prior), _probability(found, noise, prior, self._tuning.axial_offset_cost)
+        taken = max(2.0 * there - 1.0, 0.0) * mean
+        remains = there * (noise * prior / (noise + prior) + (mean - taken) ** 2) + (1.0 - there) * taken**2
+        return taken, remains, there
 
 
 def twist_rad(gh_from_arm: Array) -> float:
@@ -108,9 +151,15 @@ def _judged(found: float, noise: float, prior: float, cost: float) -> tuple[floa
         cost: Twice the logarithm of the odds against it.
     """
     total = noise + prior
-    gain = found * found * (1.0 / noise - 1.0 / total) - math.log(total / noise) - cost
-    probability = 1.0 / (1.0 + math.exp(min(-0.5 * gain, 50.0)))
+    probability = _probability(found, noise, prior, cost)
     if probability < 0.02:
         return 0.0, 0.0, 0.0
     mean = found * prior / total
     return probability * mean, probability * (noise * prior / total + (1.0 - probability) * mean * mean), probability
+
+
+def _probability(found: float, noise: float, prior: float, cost: float) -> float:
+    """Return how likely it is that something found is there; arguments as of `_judged`."""
+    total = noise + prior
+    gain = found * found * (1.0 / noise - 1.0 / total) - math.log(total / noise) - cost
+    return 1.0 / (1.0 + math.exp(min(-0.5 * gain, 50.0)))

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ghest_rt.estimation.fused.belief import ACROMION, ARM, GH, POSES, Base, Belief
+from ghest_rt.estimation.fused.reference import NO_EVIDENCE, Evidence
 from ghest_rt.estimation.fused.tuning import Tuning
 from ghest_rt.geometry.so3 import Array, exp_so3, log_so3, skew
 
@@ -16,18 +17,24 @@ LENGTH = 12
 DRIFT_SIZE = 13
 # What a posture consists of: scapula, GH centre, humerus, drift.
 _POSTURE = 9
-# What a posture depends on: of the belief's error states the poses, and the GH centre in the markers; and the elbow's place.
-_KNOWN = 18
-_FOUND = slice(9, 18)
+# What a posture depends on: of the belief's error states the poses, and the GH centre in the markers; then m0's turn
+# by the scapula (3), m1's turn about the arm by the forearm (1), the elbow's place against the beginning (3), and that of the
+# beginning against calibration (3).
+_KNOWN = 25
+_FOUND = slice(9, _KNOWN)
+_ROWS = _KNOWN - 9
+_TOLD = slice(15, _KNOWN)
+_SCAPULA, _TWIST, _ELBOW, _FIRST_ELBOW = slice(6, 9), slice(9, 10), slice(10, 13), slice(13, 16)
+# Whether a marker has moved is told by these; the rest says what it did.
+_WHETHER = 10
 # What m1 did: it is so from the beginning of the session, or since then.
 _EVER, _SINCE = 1, 2
 # Evidence (twice a logarithm) that counts as clear when an answer is held against what was seen earlier.
 _CLEAR = 10.0
-# Keeps the elbow's rows regular in answers that say nothing about it, m^2.
-_REGULAR = np.diag(np.repeat((0.0, 1e-14), (6, 3)))
-# Variance of an elbow's place that is not known, m^2.
-_ANYWHERE_M2 = 1e2
-_ELBOW = slice(15 * (_KNOWN + 1), None, _KNOWN + 1)
+# Keeps the rows regular in answers that say nothing about them.
+_REGULAR = np.diag(np.repeat((0.0, 1e-14), (6, _ROWS - 6)))
+# Variance of what is not known, m^2 and rad^2.
+_ANYTHING = 1e2
 _FROM_POSES = np.eye(_POSTURE + DRIFT_SIZE, _KNOWN)
 _FROM_DRIFT = np.eye(_POSTURE + DRIFT_SIZE, DRIFT_SIZE, -_POSTURE)
 # An answer this unlikely is left out.
@@ -50,6 +57,7 @@ class Posture:
         slide: (3,) of m0 and m1, in the axes of the marker as calibrated, m.
         turn: (3,) of m0 and m1: rotation vector of calibrated_from_actual, rad.
         drifted: Probability that m0, and that m1, is not where calibration says.
+        turned: Probability that m1 has been turned from the beginning.
     """
 
     e_from_gh: Array
@@ -58,6 +66,7 @@ class Posture:
     slide: tuple[Array, Array]
     turn: tuple[Array, Array]
     drifted: tuple[float, float]
+    turned: float
 
 
 class DriftJudge:
@@ -79,6 +88,7 @@ class DriftJudge:
         kinds = np.array(list(itertools.product((0, 1), (0, 1), (0, 1, 2), (0, 1, 2))))
         self._moved = kinds > 0
         self._since = kinds == _SINCE
+        self._turned = kinds[:, 3] == _EVER
         self._ever = (kinds[:, 2:] == _EVER).any(axis=1)
         self._came = self._since.any(axis=1)
         self._m1_moved = self._moved[:, 2:].any(axis=1)
@@ -99,7 +109,13 @@ class DriftJudge:
         self._weights = np.zeros(len(kinds))
         self._against = np.zeros(len(kinds))
 
-    def judge(self, belief: Belief, elbow_moved: Array | None = None, elbow_m2: float = 0.0) -> Posture:
+    def judge(
+        self,
+        belief: Belief,
+        elbow_moved: Array | None = None,
+        elbow_m2: float = 0.0,
+        evidence: Evidence = NO_EVIDENCE,
+    ) -> Posture:
         """Return the bones as the mean over the answers, with the covariance of the mixture.
 
         Args:
@@ -107,31 +123,36 @@ class DriftJudge:
             elbow_moved: (3,) how far the elbow, as m1 shows it, has moved in camera r1 since the beginning; axes of m1 as
                 calibrated, m. None if that is not known.
             elbow_m2: Variance of that per axis without any drift.
+            evidence: What differs from the calibration session.
         """
         explained = self._explanations(belief)
-        found = np.zeros(9)
+        found = np.zeros(_ROWS)
         found[:3], found[3:6] = belief.gh_in_marker
         found[:6] -= explained.expected
-        P = belief.P[:_KNOWN, :_KNOWN].copy()
-        P[15:], P[:, 15:] = 0.0, 0.0
-        P.ravel()[_ELBOW] = _ANYWHERE_M2 if elbow_moved is None else elbow_m2
-        if elbow_moved is not None:
-            found[6:] = elbow_moved
+        variance = np.full(_ROWS - 6, _ANYTHING)
+        for rows, value, known in (
+            (_SCAPULA, evidence.scapula, evidence.scapula_rad2),
+            (_TWIST, evidence.twist_rad, evidence.twist_rad2),
+            (_ELBOW, elbow_moved, elbow_m2),
+            (_FIRST_ELBOW, evidence.elbow, evidence.elbow_m2),
+        ):
+            if value is not None:
+                found[rows] = value
+                variance[rows.start - 6 : rows.stop - 6] = known
+        P = np.zeros((_KNOWN, _KNOWN))
+        P[:15, :15] = belief.P[:15, :15]
+        P[_TOLD, _TOLD] = np.diag(variance)
         weights = self._weigh(belief.t_ns, P[_FOUND, _FOUND], explained, found, elbow_known=elbow_moved is not None)
         kept = np.flatnonzero(weights)
         means, covariances = zip(*(self._posture(belief, P, explained, int(h), found) for h in kept), strict=True)
         if len(kept) == 1:
-            return self._compose(belief, explained, means[0], covariances[0], self._drifted(weights))
+            return self._compose(belief, explained, means[0], covariances[0], weights)
         mean = np.sum([weights[h] * m for h, m in zip(kept, means, strict=True)], axis=0)
         covariance = np.zeros((_POSTURE + DRIFT_SIZE, _POSTURE + DRIFT_SIZE))
         for h, m, part in zip(kept, means, covariances, strict=True):
             apart = m - mean
             covariance += weights[h] * (part + np.outer(apart, apart))
-        return self._compose(belief, explained, mean, covariance, self._drifted(weights))
-
-    def _drifted(self, weights: Array) -> tuple[float, float]:
-        m0, m1 = (float(weights[self._moved[:, k] | self._moved[:, k + 1]].sum()) for k in (0, 2))
-        return m0, m1
+        return self._compose(belief, explained, mean, covariance, weights)
 
     def _weigh(self, t_ns: int, P: Array, explained: "_Explained", found: Array, *, elbow_known: bool) -> Array:
         """Return the (36,) probabilities of the answers; drift is slow, they are asked for anew only now and then."""
@@ -149,7 +170,7 @@ class DriftJudge:
             cost[self._came] = np.inf
         if elbow_known:
             # The elbow tells what has happened to m1, not whether: alone, it has only moved beside the exoskeleton's.
-            markers = _evidence(S[:, :6, :6], found[:6]) + self._cost + self._against
+            markers = _evidence(S[:, :_WHETHER, :_WHETHER], found[:_WHETHER]) + self._cost + self._against
             cost[self._m1_moved] += _total(markers[self._m1_moved]) - _total(cost[self._m1_moved])
             cost[~self._m1_moved] = markers[~self._m1_moved]
         odds = np.exp(-0.5 * (cost - cost.min()))
@@ -174,7 +195,7 @@ class DriftJudge:
     def _explain(self, belief: Belief, length_m: float) -> "_Explained":
         along = self._m1_from_elw[:3, 1]
         nominal = (self._m0_from_gh[:3, 3], self._m1_from_elw[:3, 3] + length_m * along)
-        G = np.zeros((9, DRIFT_SIZE))
+        G = np.zeros((_ROWS, DRIFT_SIZE))
         expected = np.empty(6)
         variance = np.zeros(DRIFT_SIZE)
         for k, base in enumerate(belief.base):
@@ -185,10 +206,14 @@ class DriftJudge:
             G[rows, TURN[k]] = skew(there)
             variance[SLIDE[k]], variance[TURN[k]] = base.slide_variance, base.turn_variance
         G[3:6, LENGTH] = belief.base[1].turn.T @ along
-        # The elbow as m1 shows it: displaced with the marker, and turned about its centre, if that happened since.
+        G[_SCAPULA, TURN[0]] = np.eye(3)
         all_G = np.repeat(G[None], len(self._moved), axis=0)
-        all_G[:, 6:, SLIDE[1]] = self._since[:, 2, None, None] * np.eye(3)
-        all_G[:, 6:, TURN[1]] = self._since[:, 3, None, None] * -skew(self._m1_from_elw[:3, 3])
+        # The elbow as m1 shows it: displaced with the marker, and turned about its centre.
+        for rows, then in ((_ELBOW, self._since), (_FIRST_ELBOW, self._moved & ~self._since)):
+            all_G[:, rows, SLIDE[1]] = then[:, 2, None, None] * np.eye(3)
+            all_G[:, rows, TURN[1]] = then[:, 3, None, None] * -skew(self._m1_from_elw[:3, 3])
+        # The forearm tells what was there from the beginning; what has come since, AxialJudge does.
+        all_G[:, _TWIST, TURN[1]] = ~self._since[:, 3, None, None] * along
         test, prior = self._test + variance, self._prior + variance
         weighted = all_G * prior[:, None, :]
         spread = weighted @ np.swapaxes(all_G, 1, 2) + _REGULAR
@@ -214,9 +239,7 @@ class DriftJudge:
         mean[POSES] += shift[POSES]
         return mean, B @ P @ B.T + M @ explained.rest[h] @ M.T
 
-    def _compose(
-        self, belief: Belief, explained: "_Explained", mean: Array, covariance: Array, drifted: tuple[float, float]
-    ) -> Posture:
+    def _compose(self, belief: Belief, explained: "_Explained", mean: Array, covariance: Array, weights: Array) -> Posture:
         drift = mean[_POSTURE:]
         m0, m1 = (R @ base.turn.T for R, base in zip(belief.e_from_marker, belief.base, strict=True))
         e_from_gh, e_from_elw = np.eye(4), np.eye(4)
@@ -226,8 +249,19 @@ class DriftJudge:
         e_from_elw[:3, 3] = e_from_gh[:3, 3] - (explained.length_m + float(drift[LENGTH])) * e_from_elw[:3, 1]
         slides = [base.slide + drift[SLIDE[k]] for k, base in enumerate(belief.base)]
         turns = [_turned(base, drift[TURN[k]]) for k, base in enumerate(belief.base)]
-        jumped = [1.0 if base.jumped else p for base, p in zip(belief.base, drifted, strict=True)]
-        return Posture(e_from_gh, e_from_elw, covariance, (slides[0], slides[1]), (turns[0], turns[1]), (jumped[0], jumped[1]))
+        drifted = [
+            1.0 if base.jumped else float(weights[self._moved[:, 2 * k] | self._moved[:, 2 * k + 1]].sum())
+            for k, base in enumerate(belief.base)
+        ]
+        return Posture(
+            e_from_gh,
+            e_from_elw,
+            covariance,
+            (slides[0], slides[1]),
+            (turns[0], turns[1]),
+            (drifted[0], drifted[1]),
+            float(weights[self._turned].sum()),
+        )
 
 
 def _evidence(S: Array, found: Array) -> Array:
@@ -254,9 +288,9 @@ class _Explained:
         base: The jumps it was made for.
         length_m: The arm length it was made for.
         expected: (6,) GH centre in m0 and in m1 if nothing has drifted.
-        test: (36, 9, 9) how far from there it may be found, for weighing the answers.
-        spread: (36, 9, 9) the same for making use of them.
-        W: (36, 13, 9) drift from the deviation of the GH centre and the elbow.
+        test: (36, n, n) how far from there it may be found, for weighing the answers.
+        spread: (36, n, n) the same for making use of them.
+        W: (36, 13, n) drift from what is found to deviate.
         rest: (36, 13, 13) covariance of the drift that this leaves.
     """
 

@@ -15,6 +15,7 @@ from ghest_rt.estimation.fused.filter import FusedFilter
 from ghest_rt.estimation.fused.freshness import Freshness, encoders_overdue
 from ghest_rt.estimation.fused.joints import JointForecast, Joints
 from ghest_rt.estimation.fused.process import Process
+from ghest_rt.estimation.fused.reference import Comparison, Reference
 from ghest_rt.estimation.fused.report import drift_report, rotation_covariance
 from ghest_rt.estimation.fused.settled import Settled
 from ghest_rt.estimation.fused.sighting import Sighting
@@ -55,6 +56,7 @@ class FusedEstimator:
         period_ns: Mapping[str, int],
         *,
         arm_length_m: float | None = None,
+        reference: Reference | None = None,
         tuning: Tuning | None = None,
     ) -> None:
         """Start without samples.
@@ -64,13 +66,16 @@ class FusedEstimator:
             max_gap_ns: The longest silence of the encoders that is bridged.
             period_ns: Nominal frame period of each camera.
             arm_length_m: Calibrated distance from elbow to GH centre, if known.
+            reference: What the calibration session saw besides the markers.
             tuning: Takes the place of the noise and priors.
         """
         self._chain = chain
         self._tuning = tuning or Tuning()
         self._filter = FusedFilter(self._tuning, Process(self._tuning, chain.m1_from_elw[:3, 3]))
         self._judge = DriftJudge(self._tuning, chain.m0_from_gh, chain.m1_from_elw, arm_length_m)
-        self._axial = AxialJudge(self._tuning)
+        reference = reference or Reference()
+        self._comparison = Comparison(reference, self._tuning, chain.m0_from_gh, chain.m1_from_elw)
+        self._axial = AxialJudge(self._tuning, reference)
         self._elbow = Settled(6, self._tuning.reference_s, self._tuning.elbow_memory_s)
         self._unsettled_rad = _UNSETTLED * chain.sigma_limit_rad
         self._first_r1_from_m1: Array | None = None
@@ -129,7 +134,9 @@ class FusedEstimator:
         belief = known.copy()
         self._forecast(belief, t_ns, joints)
         stale = self._freshness.stale(belief.seen_ns, t_ns)
-        posture = self._judge.judge(belief, *self._elbow_moved(belief))
+        first_elbow = self._elbow.first[:3] if self._elbow.started else None
+        evidence = self._comparison.evidence(belief, first_elbow, self._axial.turned())
+        posture = self._judge.judge(belief, *self._elbow_moved(belief), evidence)
         e_from_arm = step3_4_5_e_from_arm(posture.e_from_gh, posture.e_from_elw)
         covariance = rotation_covariance(posture)
         newest_ns = {**self._inputs.newest_ns, "r0": belief.seen_ns[0], "r1": belief.seen_ns[1], "encoders": joints.newest_ns}
@@ -138,13 +145,14 @@ class FusedEstimator:
         m0_from_gh = self._chain.m0_from_gh
         m0_from_arm = eq10_m0_from_arm(posture.e_from_gh @ self._gh_from_m0, e_from_arm)
         gh_from_arm = gh_from_arm_rotation(m0_from_gh, m0_from_arm)
-        slip_rad, slip_variance = self._axial.slip.at(twist_rad(gh_from_arm))
+        slip = self._axial.slip.explained(posture.turned)
+        slip_rad, slip_variance = slip.at(twist_rad(gh_from_arm))
         if slip_rad or slip_variance:
             m0_from_arm[:3, :3] = m0_from_arm[:3, :3] @ rot_z(slip_rad)
             gh_from_arm = gh_from_arm @ rot_z(slip_rad)
             e_from_arm[:3, :3] = e_from_arm[:3, :3] @ rot_z(slip_rad)
             covariance = covariance + slip_variance * np.outer(gh_from_arm[:, 2], gh_from_arm[:, 2])
-        drift = drift_report(posture, self._axial.slip, self._chain.m1_from_elw[:3, 1])
+        drift = drift_report(posture, slip, self._chain.m1_from_elw[:3, 1])
         elbow = self._chain.elbow_angles(e_from_arm, joints.positions, posture.covariance[ARM, ARM])
         flagged = drift.m0.flagged or drift.m1.flagged
         unsettled = belief.slack > _SETTLED_SLACK or math.sqrt(float(np.trace(covariance))) > self._unsettled_rad
@@ -216,6 +224,7 @@ class FusedEstimator:
 
     def _compare_elbow(self, belief: Belief, sighting: Sighting) -> None:
         """Note where the exoskeleton has the elbow; let the forearm judge whether m1 slips about the arm."""
+        self._comparison.add(belief)
         base, R = belief.base[1], sighting.pose[:3, :3]
         elbow = sighting.pose[:3, 3] + R @ (base.turn.T @ (self._chain.m1_from_elw[:3, 3] - base.slide))
         r1_from_e = sighting.e_from_r1[:3, :3].T

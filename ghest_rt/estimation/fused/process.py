@@ -21,6 +21,8 @@ _POSE, _GH, _RATE = (slice(part.start * (SIZE + 1), part.stop * (SIZE + 1), SIZE
 _POSE_RATE = slice(RATES.start, RATES.start + 9 * (SIZE + 1), SIZE + 1)
 _EACH_BODY = np.repeat(np.eye(2), (6, 3), axis=0)
 _RATE_POSE = slice(RATES.start * SIZE, RATES.start * SIZE + 9 * (SIZE + 1), SIZE + 1)
+# A slack above this is a contradiction between the markers that no movement explains.
+_CLEAR_SLACK = 8.0
 
 
 class Process:
@@ -40,6 +42,7 @@ class Process:
         self._density = np.empty(9)
         self._density[ACROMION] = self._density[ARM] = tuning.rotation_density
         self._density[GH] = tuning.position_density
+        self._loose_m2_s = tuning.loose_m2_s
         self._creep = np.empty(6)
         for part, creep in zip(GH_IN_MARKER, tuning.creep_m2_s, strict=True):
             self._creep[part.start - BOTH_GH.start : part.stop - BOTH_GH.start] = creep
@@ -98,7 +101,7 @@ class Process:
         diagonal[_RATE_POSE] += cross
         creep = diagonal[_GH]
         if creep.max() < self._most:
-            creep += (dt * belief.slack) * self._creep
+            creep += dt * (belief.slack * self._creep + max(belief.slack - _CLEAR_SLACK, 0.0) * self._loose_m2_s)
 
     def _agility(self, belief: Belief, which: int, t_ns: int) -> float:
         unseen = t_ns - belief.seen_ns[which] > _UNSEEN_NS

@@ -36,6 +36,11 @@ class Settled:
         """Whether the first seconds are over."""
         return self._taken_s >= self._wanted_s
 
+    @property
+    def started(self) -> bool:
+        """Whether there is anything of them."""
+        return self._taken_s > 0.0
+
     def add(self, t_ns: int, value: Array) -> float:
         """Take a (n,) value at `t_ns`; return the time since the one before, s: 0 for the first, after a gap, or late."""
         dt = 0.0 if self._t_ns is None else (t_ns - self._t_ns) * 1e-9

@@ -39,6 +39,7 @@ class Tuning:
         jump_span_ns: Least time they must span.
         regain_count: After this many outliers in a row, alike or not, the marker is taken as it is seen.
         creep_m2_s: How fast the GH centre may creep in the frame of m0 and of m1, m^2/s.
+        loose_m2_s: How much faster, times the slack, while the markers clearly contradict each other: either may be moving.
         slack_gain: How fast the creep grows while the markers contradict each other about the GH centre.
         slack_fall: How fast it falls while they do not.
         most_slack: The greatest factor on the creep.
@@ -104,6 +105,7 @@ class Tuning:
     jump_span_ns: int = 40_000_000
     regain_count: int = 8
     creep_m2_s: tuple[float, float] = (3e-7, 3e-8)
+    loose_m2_s: float = 3e-7
     slack_gain: float = 1.5
     slack_fall: float = 0.35
     most_slack: float = 3e3
