@@ -96,7 +96,7 @@ def errors(method: Method, given: list[Burst]) -> tuple[Array, list[float]]:
 
 def run(quick: bool) -> dict[str, Any]:
     """Return RMS degrees and millimetres and mean NEES per sensor, fault and method; draw out/benchmarks/imaging.png."""
-    count = 4 if quick else 10
+    count = 4 if quick else 30
     results: dict[str, Any] = {"poses per cell": 2 * count}
     figure = Figure(figsize=(11.0, 7.0), layout="constrained")
     axes = figure.subplots(2, len(SENSORS), sharex=True)
