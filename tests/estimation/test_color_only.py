@@ -35,7 +35,7 @@ def recordings(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 @pytest.mark.parametrize("method", ["refined", "photometric", "fused"])
 def test_a_station_without_depth_is_valid_and_says_it_knows_less(recordings: dict[str, Path], method: str) -> None:
     less, more = (run_with_truth(recordings[name], method) for name in ("color_only", "with_depth"))
-    assert {estimate.status for estimate in less.estimates} == {Status.VALID}
+    assert {estimate.status for estimate in less.estimates[5:]} == {Status.VALID}  # the first do not know the speed yet
     # In the direction that is known best: how m1 sits about the arm is less certain than any image.
     spread = [
         float(np.mean([np.linalg.eigvalsh(e.covariance)[0] for e in run.estimates[10:] if e.covariance is not None]))

@@ -109,9 +109,10 @@ def test_an_uncertain_angle_is_degraded_and_still_told(make_clinic: Callable[...
         clinic = make_clinic(4, sigma_limit_deg=limit_deg)
         truth = clinic.posture(np.eye(3), np.eye(4), np.zeros(2))
         estimator = make_estimator(clinic.config, clinic.urdf, "u", ("yaw", "reach"))
-        estimator.add_encoder(clinic.encoder(truth, T))
-        for camera in ("r0", "r1"):
-            estimator.add_marker(clinic.observation(camera, truth, T, covariance=np.diag([2e-4] * 3 + [1e-8] * 3)))
+        for t_ns in range(T - 45_000_000, T + 1, 15_000_000):
+            estimator.add_encoder(clinic.encoder(truth, t_ns))
+            for camera in ("r0", "r1"):
+                estimator.add_marker(clinic.observation(camera, truth, t_ns, covariance=np.diag([8e-4] * 3 + [1e-8] * 3)))
         found = estimator.estimate(T)
         assert (found.status, found.reason) == (status, reason)
         assert found.gh_from_arm is not None

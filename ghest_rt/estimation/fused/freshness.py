@@ -13,7 +13,7 @@ _JITTER_NS = 8_000_000
 # A sighting older than this, and than so many frame periods, is too old even if frames have come late for long: a machine that
 # is always busy is no slow camera.
 _OLDEST_NS, _OLDEST_FRAMES = 80_000_000, 3
-# One sighting after an outage tells where a marker is, only the next ones how fast it moves.
+# One sighting at the start or after an outage tells where a marker is, only the next ones how fast it moves.
 _SIGHTINGS = 3
 
 
@@ -30,7 +30,7 @@ class Freshness:
         self._oldest_ns = [max(_OLDEST_NS, _OLDEST_FRAMES * period) for period in period_ns]
         self._latency_ns: list[float | None] = [None] * len(period_ns)
         self._taken_ns: list[int | None] = [None] * len(period_ns)
-        self._in_a_row = [_SIGHTINGS] * len(period_ns)
+        self._in_a_row = [0] * len(period_ns)
 
     def saw(self, which: int, latency_ns: int) -> None:
         """Note how long after its capture a frame of marker `which` arrived."""
@@ -49,7 +49,7 @@ class Freshness:
         self._taken_ns[which] = t_ns if before_ns is None else max(t_ns, before_ns)
 
     def returning(self) -> bool:
-        """Return whether a marker has been seen too few times since it was out of sight: its speed is not known yet."""
+        """Return whether a marker has been seen too few times since the start or an outage: its speed is not known yet."""
         return min(self._in_a_row) < _SIGHTINGS
 
     def stale(self, seen_ns: Sequence[int], t_ns: int) -> tuple[int, ...]:
