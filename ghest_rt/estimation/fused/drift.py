@@ -39,6 +39,8 @@ _FROM_POSES = np.eye(_POSTURE + DRIFT_SIZE, _KNOWN)
 _FROM_DRIFT = np.eye(_POSTURE + DRIFT_SIZE, DRIFT_SIZE, -_POSTURE)
 # An answer this unlikely is left out.
 _NEGLIGIBLE = 2e-2
+# A turn that is likelier than this counts in the covariance, even if it is not taken out.
+_DOUBTFUL = 1e-2
 # The answers are weighed this often.
 _WEIGH_NS = 150_000_000
 # The arm length is taken anew into the geometry when it has changed by this much.
@@ -107,6 +109,11 @@ class DriftJudge:
         self._weighed: _Explained | None = None
         self._weighed_ns = 0
         self._weights = np.zeros(len(kinds))
+        # One turn of each marker, not both, is what is doubted.
+        self._leniency = tuning.turn_doubt * (self._moved[:, 1] ^ self._moved[:, 3])
+        self._doubts = np.zeros(len(kinds))
+        self._doubt = np.zeros((_POSTURE + DRIFT_SIZE, _POSTURE + DRIFT_SIZE))
+        self._doubted_ns = -1
         self._against = np.zeros(len(kinds))
 
     def judge(
@@ -145,14 +152,29 @@ class DriftJudge:
         weights = self._weigh(belief.t_ns, P[_FOUND, _FOUND], explained, found, elbow_known=elbow_moved is not None)
         kept = np.flatnonzero(weights)
         means, covariances = zip(*(self._posture(belief, P, explained, int(h), found) for h in kept), strict=True)
-        if len(kept) == 1:
-            return self._compose(belief, explained, means[0], covariances[0], weights)
         mean = np.sum([weights[h] * m for h, m in zip(kept, means, strict=True)], axis=0)
         covariance = np.zeros((_POSTURE + DRIFT_SIZE, _POSTURE + DRIFT_SIZE))
         for h, m, part in zip(kept, means, covariances, strict=True):
             apart = m - mean
             covariance += weights[h] * (part + np.outer(apart, apart))
+        if evidence.scapula is not None or evidence.elbow is not None:
+            covariance += self._doubt_of(belief, P, explained, found, mean)
         return self._compose(belief, explained, mean, covariance, weights)
+
+    def _doubt_of(self, belief: Belief, P: Array, explained: "_Explained", found: Array, mean: Array) -> Array:
+        """Return the (22, 22) variance about the mean of turns that are too unlikely to be taken out, and too likely to ignore.
+
+        A calibration session that is repeated to some degrees only cannot rule out a turn of less. Asked for as often as the
+        answers are weighed.
+        """
+        if self._doubted_ns != self._weighed_ns:
+            self._doubted_ns = self._weighed_ns
+            self._doubt = np.zeros((_POSTURE + DRIFT_SIZE, _POSTURE + DRIFT_SIZE))
+            for h in np.flatnonzero((self._doubts > _DOUBTFUL) & (self._weights == 0.0)):
+                shift, part = self._posture(belief, P, explained, int(h), found)
+                apart = shift - mean
+                self._doubt += self._doubts[h] * (part + np.outer(apart, apart))
+        return self._doubt
 
     def _weigh(self, t_ns: int, P: Array, explained: "_Explained", found: Array, *, elbow_known: bool) -> Array:
         """Return the (36,) probabilities of the answers; drift is slow, they are asked for anew only now and then."""
@@ -173,6 +195,9 @@ class DriftJudge:
             markers = _evidence(S[:, :_WHETHER, :_WHETHER], found[:_WHETHER]) + self._cost + self._against
             cost[self._m1_moved] += _total(markers[self._m1_moved]) - _total(cost[self._m1_moved])
             cost[~self._m1_moved] = markers[~self._m1_moved]
+        honest = cost - self._leniency
+        doubts = np.exp(-0.5 * (honest - honest.min()))
+        self._doubts = doubts / doubts.sum()
         odds = np.exp(-0.5 * (cost - cost.min()))
         odds[odds < _NEGLIGIBLE] = 0.0
         self._weights = odds / odds.sum()

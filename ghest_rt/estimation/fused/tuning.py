@@ -52,6 +52,7 @@ class Tuning:
         exact_rad: What is left of a turn where there is no drift.
         slide_cost: Twice the logarithm of the odds against a slide.
         turn_cost: Twice the logarithm of the odds against a turn: m0, m1.
+        turn_doubt: Taken off the cost of a turn for the covariance, where there is a calibration session to compare with.
         arm_length_m: Standard deviation of a calibrated arm length.
         axial_memory_s: The disagreement of forearm and m1 about the arm is averaged over this time; faster is movement.
         reference_s: Over this time at first it is learned how forearm and m1 agree, and where the elbow is.
@@ -137,5 +138,6 @@ class Tuning:
     lag_sigma: float = 0.3
     lag_tolerance: float = 0.04
     lag_cost: float = 8.0
+    turn_doubt: float = 9.0
     arm_length_m: float = 1e-3
     unknown_arm_length_m: float = 0.05
