@@ -136,7 +136,7 @@ def run(quick: bool) -> dict[str, Any]:
         results[f"photometric / bound, orientation, {sensor}: mean and greatest"] = (
             f"{np.mean(values):.2f}, {np.max(values):.2f}"
         )
-    axes[0][0].legend(fontsize=8)
+    figure.legend(*axes[0][0].get_legend_handles_labels(), loc="outside upper center", ncols=5, fontsize=9)
     _OUT.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(_OUT, dpi=120)
     return results
