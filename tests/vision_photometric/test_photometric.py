@@ -127,13 +127,15 @@ def test_the_profile_has_the_pixel_s_and_the_blur_s_variance_whatever_the_direct
     assert density @ distance_px**2 == pytest.approx(PIXEL_VARIANCE + blur_px**2, rel=0.02)
 
 
-@pytest.mark.parametrize("info", [paper_camera(), sr300_camera()], ids=["paper", "sr300"])
-def test_from_a_good_prediction_it_finds_the_pose_that_it_finds_from_the_centres(info, monkeypatch):
+@pytest.mark.parametrize(("info", "count"), [(paper_camera(), 40), (sr300_camera(), 16)], ids=["paper", "sr300"])
+def test_from_a_good_prediction_it_is_no_worse_than_from_the_centres(info, count, monkeypatch):
     rng = np.random.default_rng(68)
-    pose, frames = random_pose(rng, (0.2, 0.24), max_tilt_deg=25.0), []
-    for k in range(6):
+    pose, poses, frames = random_pose(rng, (0.2, 0.24), max_tilt_deg=25.0), [], []
+    for k in range(count):
+        pose = pose.copy()
         pose[:3, :3] = exp_so3(np.array([0.006, -0.004, 0.003])) @ pose[:3, :3]
         pose[:3, 3] += (0.0002, 0.0003, -0.0004)
+        poses.append(pose)
         frames.append(render(Scene(pose, **NOISE), info, rng, seq=k, t_ns=k * 16_000_000, samples=4))
     solved = []
     whole = Solver.track
@@ -142,17 +144,16 @@ def test_from_a_good_prediction_it_finds_the_pose_that_it_finds_from_the_centres
     def tracked():
         solved.clear()
         detector = make_detector("photometric", "r0", "m0", MARKER, info)
-        return [detector.detect(frame) for frame in frames], len(solved)
+        seen = [detector.detect(frame).camera_from_marker for frame in frames]
+        errors = [pose_error(found, pose) for found, pose in zip(seen, poses, strict=True)]
+        return np.sqrt(np.mean(np.square(errors), axis=0)), len(solved)
 
     straight, how_often = tracked()
     monkeypatch.setattr(Solver, "foretold", lambda *_: False)
     by_centres, always = tracked()
-    assert how_often < always == len(frames) - 1
-    apart = []
-    for one, other in zip(straight[1:], by_centres[1:], strict=True):
-        away = error_vector(one.camera_from_marker, other.camera_from_marker)
-        apart.append(away @ np.linalg.solve(other.covariance, away))
-    assert np.mean(apart) < 1.0  # noise displaces both by 6
+    assert how_often < 0.5 * always
+    assert always == count - 1
+    assert (straight < 1.1 * by_centres).all()
 
 
 def test_a_disk_that_is_not_where_it_was_foretold_is_left_to_the_solver(monkeypatch):
