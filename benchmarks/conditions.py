@@ -12,7 +12,7 @@ from ghest_rt.simulation.faults import parse_fault
 TUNING_SEEDS = (11,)
 """Seeds that priors and noise were chosen with."""
 
-HELD_OUT_SEEDS = (101, 102, 103)
+HELD_OUT_SEEDS = (201, 202, 203)
 """Seeds to judge with; docs/fused-estimator.md says which of them have been looked at."""
 
 DURATION_S = 6.0

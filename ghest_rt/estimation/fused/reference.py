@@ -104,6 +104,8 @@ class Comparison:
         self._prior = np.diag((0.0, 1.0, 1.0)) / tuning.rhythm_sigma**2
         self._squares = np.zeros((3, 3))
         self._products = np.zeros((3, 3))
+        self._scapula: Array | None = None
+        self._scapula_rad2 = 0.0
         self._t_ns: int | None = None
 
     def add(self, belief: Belief) -> None:
@@ -124,6 +126,9 @@ class Comparison:
         kept = math.exp(-dt / self._tuning.rhythm_memory_s)
         self._squares = kept * self._squares + information * np.outer(where, where)
         self._products = kept * self._products + information * np.outer(where, turned)
+        inverse = np.linalg.inv(self._squares + self._prior)
+        self._scapula = inverse[0] @ self._products
+        self._scapula_rad2 = float(inverse[0, 0]) + self._reference.scapula_sigma_rad**2
 
     def evidence(self, belief: Belief, first_elbow: Array | None, twist: tuple[float, float] | None) -> Evidence:
         """Return how this session differs.
@@ -134,12 +139,8 @@ class Comparison:
             twist: How far m1 has turned about the arm by the forearm, and the variance of that; rad, rad^2.
         """
         reference = self._reference
-        elbow, scapula, scapula_rad2 = None, None, 0.0
+        elbow = None
         if reference.elbow_m is not None and first_elbow is not None:
             in_e = belief.e_from_r1[:3, :3] @ (first_elbow - reference.elbow_m)
             elbow = np.asarray(belief.base[1].turn @ (belief.e_from_marker[1].T @ in_e))
-        if self._squares[0, 0] > 0.0:
-            inverse = np.linalg.inv(self._squares + self._prior)
-            scapula = inverse[0] @ self._products
-            scapula_rad2 = float(inverse[0, 0]) + reference.scapula_sigma_rad**2
-        return Evidence(scapula, scapula_rad2, elbow, reference.elbow_sigma_m**2, *(twist or (None, 0.0)))
+        return Evidence(self._scapula, self._scapula_rad2, elbow, reference.elbow_sigma_m**2, *(twist or (None, 0.0)))
