@@ -15,7 +15,7 @@ from ghest_rt.estimation.pipeline import Method, Pipeline
 from ghest_rt.messages.results import GhEstimate, MarkerObservation
 from ghest_rt.simulation.anatomy import anatomy
 from ghest_rt.simulation.calibrating import with_reference
-from ghest_rt.simulation.command import SimulateOptions, build_world, session_of
+from ghest_rt.simulation.command import SimulateOptions, build_world
 from ghest_rt.simulation.faults import FaultyDevices
 from ghest_rt.simulation.fitting import fit_station
 from ghest_rt.studies.truth import TruthTrack
@@ -58,15 +58,20 @@ def observed(options: SimulateOptions, vision: Method) -> Session:
     key = hashlib.sha256(repr((options, vision, geometry)).encode()).hexdigest()[:16]
     path = FOLDER / "observed" / f"{key}.pickle"
     if path.exists():
-        found: Session = pickle.loads(path.read_bytes())
-        # What does not change the images may have changed in the station file since.
-        return replace(found, station=with_reference(station, body, options.seed, session_of(options)))
-    session = _observe(options, vision)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_suffix(".part")
-    part.write_bytes(pickle.dumps(session))
-    part.replace(path)
-    return session
+        session: Session = pickle.loads(path.read_bytes())
+    else:
+        session = _observe(options, vision)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        part = path.with_suffix(".part")
+        part.write_bytes(pickle.dumps(session))
+        part.replace(path)
+    # What does not change the images may have changed in the station file since. Every condition has a calibration of its own.
+    return replace(session, station=with_reference(station, body, options.seed, _condition(options)))
+
+
+def _condition(options: SimulateOptions) -> str:
+    moves = (f"{move.kind} {move.text}" for move in options.marker_moves)
+    return "; ".join((options.movement or str(options.motion and options.motion.stem), *moves, options.soft_tissue))
 
 
 def shipped_station(options: SimulateOptions) -> Path:

@@ -40,7 +40,8 @@ def with_reference(station: LoadedStation, body: Anatomy, seed: int, session: st
         station: With the settings made for this patient. One that has a reference stays as it is.
         body: The patient.
         seed: Of what the session to come does not repeat exactly.
-        session: What happens in that session: another session of the same seed repeats other things inexactly.
+        session: Names that session: another one of the same seed repeats other things inexactly. The simulated clinic names it
+            by the movement alone, so that the station file tells nothing of what goes wrong.
 
     Raises:
         BadInputError: The station's URDF cannot be simulated.

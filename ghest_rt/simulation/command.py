@@ -143,10 +143,11 @@ def build_world(options: SimulateOptions) -> World:
             f"{station.source}: station.arm is {station.config.station.arm}, asked for is the {options.arm} arm; "
             f"use --arm {station.config.station.arm} or another station file"
         )
+    motion = _motion(options)
     return World(
-        with_reference(station, body, options.seed, session_of(options)),
+        with_reference(station, body, options.seed, motion.name),
         body,
-        _motion(options),
+        motion,
         sensors,
         seed=options.seed,
         texture=options.marker,
@@ -156,12 +157,6 @@ def build_world(options: SimulateOptions) -> World:
         soft_tissue=find_soft_tissue(options.soft_tissue),
         imaging=options.imaging,
     )
-
-
-def session_of(options: SimulateOptions) -> str:
-    """Return what happens in a session, whatever it is seen with: movement, marker moves, soft tissue."""
-    moves = (f"{move.kind} {move.text}" for move in options.marker_moves)
-    return "; ".join((options.movement or str(options.motion and options.motion.stem), *moves, options.soft_tissue))
 
 
 def _knee_world(options: SimulateOptions, station: LoadedStation) -> StagedWorld:

@@ -63,12 +63,11 @@ def observe(world: World, methods: Collection[Method], cameras: Collection[str] 
 
 
 def with_markers_of(base: Observed, moved: Observed, cameras: Collection[str]) -> Observed:
-    """Return a session in which some cameras' markers are those of another, with that other one's station and truth.
+    """Return a session in which some cameras' markers are those of another, with that other one's truth.
 
-    The two differ in where markers are on their bones, and in what their calibration sessions did not repeat exactly: what the
-    remaining cameras see is the same in both.
+    The two differ in nothing but where markers are on their bones: what the remaining cameras see is the same in both.
     """
     markers: Mapping[tuple[Method, str], list[MarkerObservation]] = {
         key: observations for key, observations in base.markers.items() if key[1] not in cameras
     }
-    return Observed(moved.station, base.camera_infos, base.joints, base.encoders, moved.truth, {**markers, **moved.markers})
+    return Observed(base.station, base.camera_infos, base.joints, base.encoders, moved.truth, {**markers, **moved.markers})
