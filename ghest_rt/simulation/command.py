@@ -63,6 +63,7 @@ class SimulateOptions:
         soft_tissue: How skin moves the markers.
         faults: What the devices fail to deliver.
         color_only: Cameras without depth; the recording's station file says so.
+        calibration_reference: The station file has what a calibration session saw besides the markers.
         imaging: What goes wrong with the colour images.
     """
 
@@ -82,6 +83,7 @@ class SimulateOptions:
     soft_tissue: SoftTissueName = "none"
     faults: tuple[DeviceFault, ...] = ()
     color_only: bool = False
+    calibration_reference: bool = False
     imaging: Imaging = field(default_factory=Imaging)
 
 
@@ -144,8 +146,10 @@ def build_world(options: SimulateOptions) -> World:
             f"use --arm {station.config.station.arm} or another station file"
         )
     motion = _motion(options)
+    if options.calibration_reference:
+        station = with_reference(station, body, options.seed, motion.name)
     return World(
-        with_reference(station, body, options.seed, motion.name),
+        station,
         body,
         motion,
         sensors,
@@ -334,6 +338,8 @@ def _command(options: SimulateOptions, motion_name: str) -> str:
         words += ["--marker", options.marker]
     if options.color_only:
         words.append("--color-only")
+    if options.calibration_reference:
+        words.append("--calibration-reference")
     for move in options.marker_moves:
         words += [f"--marker-{move.kind}", move.text]
     if options.soft_tissue != "none":

@@ -59,6 +59,10 @@ def simulate(
     fault: Faults = None,
     image: ImageFaults = None,
     color_only: Annotated[bool, typer.Option("--color-only", metavar="", help="Cameras without depth")] = False,
+    calibration_reference: Annotated[
+        bool,
+        typer.Option("--calibration-reference", metavar="", help="Station file with \\[calibration.reference], an experiment"),
+    ] = False,
     as_json: Json = False,
 ) -> None:
     """Record a simulated patient in the exoskeleton, with the true angles (needs the extra 'sim')."""
@@ -89,6 +93,7 @@ def simulate(
             faults=tuple(map(parse_fault, fault or ())),
             imaging=parse_imaging(image or ()),
             color_only=color_only,
+            calibration_reference=calibration_reference,
         ),
         as_json,
     )
