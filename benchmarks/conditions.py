@@ -47,7 +47,7 @@ def conditions() -> tuple[Condition, ...]:
 
 
 def _options(movement: str, **more: object) -> SimulateOptions:
-    return replace(SimulateOptions(out=Path(), movement=movement, duration_s=DURATION_S), **more)  # type: ignore[arg-type]
+    return replace(SimulateOptions(out=Path(), movement=movement, duration_s=DURATION_S), **more)  # type: ignore[arg-type]  # fields by name
 
 
 def _plain() -> Iterable[Condition]:
