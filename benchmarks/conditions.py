@@ -4,10 +4,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from ghest_rt.estimation.pipeline import Method
 from ghest_rt.simulation.command import SimulateOptions
 from ghest_rt.simulation.disturbances import parse_shift, parse_turn
 from ghest_rt.simulation.faults import parse_fault
+from ghest_rt.vision.station import Method
 
 TUNING_SEEDS = (11,)
 """Seeds that priors and noise were chosen with."""

@@ -11,7 +11,7 @@ from ghest_drivers.samples import CameraInfo, EncoderSample
 from ghest_rt.config.load import LoadedStation, load_station
 from ghest_rt.config.shipped import shipped_config_dir
 from ghest_rt.estimation.interface import GhEstimator
-from ghest_rt.estimation.pipeline import Method, Pipeline
+from ghest_rt.estimation.pipeline import Pipeline
 from ghest_rt.messages.results import GhEstimate, MarkerObservation
 from ghest_rt.simulation.anatomy import anatomy
 from ghest_rt.simulation.calibrating import with_reference
@@ -20,6 +20,7 @@ from ghest_rt.simulation.faults import FaultyDevices
 from ghest_rt.simulation.fitting import fit_station
 from ghest_rt.studies.truth import TruthTrack
 from ghest_rt.sync.grid import Grid
+from ghest_rt.vision.station import Method
 
 Sample = MarkerObservation | EncoderSample
 

@@ -12,12 +12,13 @@ from rich.console import Console
 from rich.table import Table
 
 from benchmarks.scenes import FOLDER
-from ghest_rt.estimation.pipeline import Method, lag_ns_of
+from ghest_rt.estimation.pipeline import lag_ns_of
+from ghest_rt.studies.observing.observed import observe
+from ghest_rt.studies.observing.scenario import Scenario
 from ghest_rt.studies.rivals.angle_errors import ANGLES, Answers, error_statistics, truth_track
 from ghest_rt.studies.rivals.running import run_without_cameras
 from ghest_rt.studies.session.estimating import estimate_session
-from ghest_rt.studies.session.observed import observe
-from ghest_rt.studies.session.scenario import Scenario
+from ghest_rt.vision.station import Method
 
 _MOVEMENTS = ("SFE", "SAbAd", "SIR", "COMB")
 _METHODS: tuple[Method, ...] = ("paper", "refined", "fused")

@@ -8,8 +8,9 @@ import cv2
 from benchmarks.scenes import scene
 from benchmarks.timing import summary_ms
 from ghest_drivers.samples import EncoderSample, RgbdFrame
-from ghest_rt.estimation.pipeline import Method, Pipeline
+from ghest_rt.estimation.pipeline import Pipeline
 from ghest_rt.recording.reader import Recording
+from ghest_rt.vision.station import Method
 
 
 def run(quick: bool) -> dict[str, Any]:

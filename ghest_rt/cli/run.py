@@ -18,7 +18,6 @@ from ghest_rt.config.devices import SimBackend
 from ghest_rt.config.load import LoadedStation, load_station
 from ghest_rt.config.station import StationConfig
 from ghest_rt.errors import BadInputError, GhestError
-from ghest_rt.estimation.pipeline import Method as PipelineMethod
 from ghest_rt.estimation.pipeline import Pipeline, lag_ns_of
 from ghest_rt.extras import need_extra
 from ghest_rt.service.clocks import ScaledClock
@@ -30,6 +29,7 @@ from ghest_rt.service.notify import service_manager
 from ghest_rt.service.outputs import Output
 from ghest_rt.service.run import run_service
 from ghest_rt.service.stop_signals import StopSignals
+from ghest_rt.vision.station import Method as PipelineMethod
 
 if TYPE_CHECKING:
     from ghest_rt.cli.recording import LiveRecording, RecordOptions

@@ -1,8 +1,6 @@
 """One station's whole path from frames and encoder samples to GH estimates, for the live service and off-line runs alike."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from typing import Literal
 
 from ghest_drivers.samples import CameraInfo, EncoderSample, RgbdFrame
 from ghest_rt.config.load import LoadedStation
@@ -10,11 +8,9 @@ from ghest_rt.config.station import StationConfig
 from ghest_rt.errors import BadInputError
 from ghest_rt.estimation.arm_chain import CAMERAS
 from ghest_rt.estimation.factory import make_estimator
-from ghest_rt.messages.results import GhEstimate, MarkerObservation, MarkerStatus
+from ghest_rt.messages.results import GhEstimate, MarkerObservation
 from ghest_rt.vision.detector import MarkerDetector
-from ghest_rt.vision.factory import make_detector
-
-Method = Literal["paper", "refined", "photometric", "aruco", "fused"]
+from ghest_rt.vision.station import Method, StationVision
 
 
 def lag_ns_of(config: StationConfig, method: str | None = None) -> int:
@@ -69,22 +65,8 @@ class Pipeline:
         self.method: Method = method or config.estimator.method
         self.rate_hz = config.rate_hz
         self.lag_ns = lag_ns_of(config, self.method)
-        self._without_depth = frozenset(camera for camera in CAMERAS if not config.cameras[camera].depth)
-        self._detectors = (
-            dict(detectors)
-            if detectors is not None
-            else {
-                camera: make_detector(
-                    "photometric" if self.method == "fused" else self.method,
-                    camera,
-                    config.cameras[camera].marker,
-                    config.markers[config.cameras[camera].marker],
-                    camera_infos[camera],
-                    color_only=camera in self._without_depth,
-                )
-                for camera in CAMERAS
-            }
-        )
+        infos = {camera: camera_infos[camera] for camera in CAMERAS}
+        self._vision = StationVision(config, infos, self.method, detectors)
         self._estimator = make_estimator(
             config,
             station.urdf_text,
@@ -100,14 +82,8 @@ class Pipeline:
         return CAMERAS
 
     def observe(self, frame: RgbdFrame) -> MarkerObservation:
-        """Find the camera's marker in a frame, steps 3.3.1; frames of one camera in their order.
-
-        A pose from colour alone is no worse than normal where the station file leaves depth out.
-        """
-        seen = self._detectors[frame.info.name].detect(frame)
-        if seen.status is MarkerStatus.COLOR_ONLY and seen.camera in self._without_depth:
-            return replace(seen, status=MarkerStatus.OK)
-        return seen
+        """Find the camera's marker in a frame, steps 3.3.1; frames of one camera in their order."""
+        return self._vision.observe(frame)
 
     def add(self, sample: MarkerObservation | EncoderSample) -> None:
         """Take what `observe` returned, or an encoder sample, in the order of arrival."""

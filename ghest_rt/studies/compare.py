@@ -10,11 +10,11 @@ from ghest_rt.studies.compare_verdicts import verdict
 from ghest_rt.studies.engine.run import Executor, Progress, run_tasks
 from ghest_rt.studies.engine.store import ResultStore
 from ghest_rt.studies.movements import METHODS, Movements, frames_of
+from ghest_rt.studies.observing.scenario import Scenario
 from ghest_rt.studies.rivals.angle_errors import QUANTITIES
 from ghest_rt.studies.rivals.contenders import CONTENDERS
 from ghest_rt.studies.rivals.running import REST_S
 from ghest_rt.studies.rivals.tasks import compare_task
-from ghest_rt.studies.session.scenario import Scenario
 
 SensorName = Literal["paper", "sr300"]
 Row = dict[str, object]

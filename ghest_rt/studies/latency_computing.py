@@ -4,8 +4,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from statistics import median
 
-from ghest_rt.estimation.pipeline import Method, Pipeline
+from ghest_rt.estimation.pipeline import Pipeline
 from ghest_rt.simulation.world import World
+from ghest_rt.vision.station import Method
 
 Clock = Callable[[], int]
 

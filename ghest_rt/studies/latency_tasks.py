@@ -10,7 +10,7 @@ import numpy as np
 
 from ghest_rt.config.load import LoadedStation
 from ghest_rt.errors import BadInputError
-from ghest_rt.estimation.pipeline import Method, lag_ns_of
+from ghest_rt.estimation.pipeline import lag_ns_of
 from ghest_rt.geometry.so3 import angle_between_rad
 from ghest_rt.messages.results import GhEstimate
 from ghest_rt.simulation.anatomy import anatomy
@@ -21,11 +21,12 @@ from ghest_rt.simulation.sensors import find_sensors
 from ghest_rt.simulation.therapy import TherapyMotion, find_movement
 from ghest_rt.simulation.world import World
 from ghest_rt.studies.engine.task import Result, Task
+from ghest_rt.studies.observing.observed import Observed, observe
+from ghest_rt.studies.observing.scenario import Scenario
 from ghest_rt.studies.rivals.angle_errors import Answers, error_columns, truth_track
 from ghest_rt.studies.session.estimating import estimate_session
-from ghest_rt.studies.session.observed import Observed, observe
-from ghest_rt.studies.session.scenario import Scenario
 from ghest_rt.studies.truth import TruthTrack
+from ghest_rt.vision.station import Method
 
 _HERE = "ghest_rt.studies.latency_tasks"
 _FRAME_COST = {"paper": 1.0, "sr300": 16.0}

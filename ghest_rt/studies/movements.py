@@ -5,12 +5,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from ghest_rt.estimation.pipeline import Method
 from ghest_rt.simulation.opensim_file import read_motion_table
 from ghest_rt.simulation.sensors import find_sensors
 from ghest_rt.simulation.therapy import find_movement
+from ghest_rt.studies.observing.scenario import Scenario, motion_file
 from ghest_rt.studies.paper_values import MOVEMENTS
-from ghest_rt.studies.session.scenario import Scenario, motion_file
+from ghest_rt.vision.station import Method
 
 METHODS: tuple[Method, ...] = ("paper", "refined", "fused")
 """The methods that studies compare unless told otherwise."""

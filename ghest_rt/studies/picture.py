@@ -12,12 +12,13 @@ from numpy.typing import NDArray
 from ghest_drivers.samples import RgbdFrame
 from ghest_rt.errors import BadInputError
 from ghest_rt.estimation.angles import AngleSigns, Arm, clinical, euler_yxz, signs_of
-from ghest_rt.estimation.pipeline import Method, Pipeline
+from ghest_rt.estimation.pipeline import Pipeline
 from ghest_rt.extras import need_extra
 from ghest_rt.messages.results import MarkerObservation
 from ghest_rt.recording.reader import Recording
 from ghest_rt.studies.metrics import sample_error
 from ghest_rt.studies.score import JudgedRun, Progress, run_with_truth
+from ghest_rt.vision.station import Method
 
 _COLORS = {"flexion": "#0072B2", "abduction": "#D55E00", "rotation": "#009E73"}  # Okabe-Ito, safe for colour-blind readers
 _AXIS_RGB = ((230, 60, 40), (40, 170, 60), (40, 90, 220))

@@ -9,11 +9,12 @@ from statistics import fmean
 from ghest_rt.config.load import LoadedStation
 from ghest_rt.errors import BadInputError
 from ghest_rt.estimation.offline import estimate_events
-from ghest_rt.estimation.pipeline import Method, Pipeline
+from ghest_rt.estimation.pipeline import Pipeline
 from ghest_rt.messages.results import GhEstimate, TruthSample
 from ghest_rt.recording.reader import Recording
 from ghest_rt.studies.metrics import ErrorAccumulator
 from ghest_rt.studies.truth import TruthTrack
+from ghest_rt.vision.station import Method
 
 Progress = Callable[[float], None]
 

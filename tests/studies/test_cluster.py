@@ -12,8 +12,9 @@ from ghest_rt.studies.engine.cluster import ClusterExecutor
 from ghest_rt.studies.engine.local import LocalExecutor
 from ghest_rt.studies.engine.run import run_tasks
 from ghest_rt.studies.engine.store import ResultStore
-from ghest_rt.studies.session.scenario import Scenario
-from ghest_rt.studies.session.tasks import judge_task, observe_task
+from ghest_rt.studies.observing.scenario import Scenario
+from ghest_rt.studies.observing.tasks import observe_task
+from ghest_rt.studies.session.tasks import judge_task
 from tests.studies.study_tasks import square_task
 
 distributed = pytest.importorskip("distributed")

@@ -11,6 +11,8 @@ from ghest_rt.errors import BadInputError
 from ghest_rt.studies.engine.local import LocalExecutor
 from ghest_rt.studies.engine.store import ResultStore
 from ghest_rt.studies.movements import Movements
+from ghest_rt.studies.observing.observed import observe
+from ghest_rt.studies.observing.scenario import Scenario
 from ghest_rt.studies.paper_values import MOVEMENTS, PARAMETERS
 from ghest_rt.studies.sensitivity.checks import checks
 from ghest_rt.studies.sensitivity.derivative import eq11_relative_sensitivity
@@ -19,8 +21,6 @@ from ghest_rt.studies.sensitivity.sobol import check_samples, run_sobol, sobol_p
 from ghest_rt.studies.sensitivity.study import Row, SensitivityPlan, run_sensitivity
 from ghest_rt.studies.sensitivity.summary import summarise
 from ghest_rt.studies.sensitivity.surrogate import Surrogate
-from ghest_rt.studies.session.observed import observe
-from ghest_rt.studies.session.scenario import Scenario
 
 
 @pytest.mark.parametrize("b", [0.0, 2e-4])

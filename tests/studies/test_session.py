@@ -8,11 +8,12 @@ import pytest
 from ghest_rt.errors import BadInputError
 from ghest_rt.simulation.command import SimulateOptions, simulate
 from ghest_rt.simulation.disturbances import parse_shift
+from ghest_rt.studies.observing.observed import observe
+from ghest_rt.studies.observing.packing import pack, unpack
+from ghest_rt.studies.observing.scenario import MountError, Scenario, motion_file
+from ghest_rt.studies.observing.tasks import observe_session, observe_task
 from ghest_rt.studies.score import score_recording
-from ghest_rt.studies.session.observed import observe
-from ghest_rt.studies.session.packing import pack, unpack
-from ghest_rt.studies.session.scenario import MountError, Scenario, motion_file
-from ghest_rt.studies.session.tasks import judge_session, judge_task, observe_session, observe_task
+from ghest_rt.studies.session.tasks import judge_session, judge_task
 
 METHODS = ("paper", "refined", "fused")
 DURATION_S = 0.6
@@ -23,10 +24,9 @@ def scenario(**changes: object) -> Scenario:
 
 
 def judged(case: Scenario, *, base: bool = False) -> dict[str, dict[str, dict[str, float]]]:
-    undisturbed = observe_task(case.undisturbed(), 40)
-    task = judge_task(case, 40, undisturbed if base else None)
-    needs = [observe_session(undisturbed.parameters, ())] if base else []
-    return judge_session(task.parameters, needs).values  # type: ignore[return-value]
+    task = judge_task(case, 40, observe_task(case.undisturbed(), 40) if base else None)
+    seen = [observe_session(need.parameters, ()) for need in task.needs]
+    return judge_session(task.parameters, seen).values  # type: ignore[return-value]
 
 
 def test_in_memory_the_figures_are_those_of_score_on_a_recording(tmp_path: Path) -> None:

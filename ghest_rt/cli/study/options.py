@@ -9,7 +9,7 @@ from ghest_rt.cli.options import MOVEMENTS, Method, Movement
 from ghest_rt.errors import BadInputError
 
 if TYPE_CHECKING:
-    from ghest_rt.estimation.pipeline import Method as MethodName
+    from ghest_rt.vision.station import Method as MethodName
 
 Movements = Annotated[
     list[Movement] | None,

@@ -4,13 +4,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, cast
 
-from ghest_rt.estimation.pipeline import Method
 from ghest_rt.studies.engine.run import Executor, Progress, run_tasks, spent_cpu_s
 from ghest_rt.studies.engine.store import ResultStore
 from ghest_rt.studies.movements import METHODS, Movements, frames_of
+from ghest_rt.studies.observing.scenario import Scenario
 from ghest_rt.studies.session.errors import QUANTITIES, STATISTICS
-from ghest_rt.studies.session.scenario import Scenario
 from ghest_rt.studies.session.tasks import judge_task
+from ghest_rt.vision.station import Method
 
 Row = dict[str, object]
 SensorName = Literal["paper", "sr300"]

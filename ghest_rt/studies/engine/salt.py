@@ -9,21 +9,26 @@ from pathlib import Path
 import ghest_rt
 from ghest_rt.config.shipped import shipped_config_dir
 
-# Rooms and files of the application that change what a simulated session or an estimate comes out as.
-_CODE = (
+# Rooms and files that change what is seen of a simulated session, and those that change besides what is estimated from it.
+_SEEING = (
     "config",
-    "estimation",
     "geometry",
-    "kinematics",
     "messages",
     "simulation",
+    "studies/observing",
+    "vision",
+)
+_JUDGING = (
+    *_SEEING,
+    "estimation",
+    "kinematics",
     "studies/metrics.py",
     "studies/rivals/angle_errors.py",
     "studies/session",
     "studies/truth.py",
     "sync",
-    "vision",
 )
+_OBSERVING = "ghest_rt.studies.observing"
 _LIBRARIES = ("numpy", "mujoco", "opencv-python-headless", "mink", "daqp", "scipy", "imufusion")
 
 
@@ -32,9 +37,12 @@ def code_salt(kind: str) -> str:
     """Return the hash of the code behind tasks of a kind, of the shipped station files, and of the libraries' versions.
 
     The kind's code is its module and those beside it in a package of a study; of `ghest_rt.studies` itself only the module.
+    What is observed does not depend on the estimators: it is kept when only they change.
     """
-    digest = hashlib.sha256(_common().encode())
-    spec = importlib.util.find_spec(kind.partition(":")[0])
+    module_name = kind.partition(":")[0]
+    seeing = module_name.startswith(_OBSERVING)
+    digest = hashlib.sha256(_hash_of(_SEEING if seeing else _JUDGING).encode())
+    spec = importlib.util.find_spec(module_name)
     if spec is not None and spec.origin is not None:
         module = Path(spec.origin)
         beside = [module] if module.parent == Path(__file__).parents[1] else sorted(module.parent.glob("*.py"))
@@ -44,12 +52,12 @@ def code_salt(kind: str) -> str:
 
 
 @cache
-def _common() -> str:
+def _hash_of(code: tuple[str, ...]) -> str:
     digest = hashlib.sha256()
     for package in _LIBRARIES:
         digest.update(f"{package} {_version(package)}\0".encode())
     root = Path(ghest_rt.__file__).parent
-    for name in _CODE:
+    for name in code:
         path = root / name
         for file in sorted(path.rglob("*.py")) if path.is_dir() else [path]:
             digest.update(file.relative_to(root).as_posix().encode() + b"\0" + file.read_bytes())

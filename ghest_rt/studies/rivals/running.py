@@ -13,6 +13,7 @@ from ghest_rt.messages.results import TruthSample
 from ghest_rt.simulation.anatomy import anatomy
 from ghest_rt.simulation.scene import arm_from_elw
 from ghest_rt.simulation.sensors import find_sensors
+from ghest_rt.studies.observing.observed import Observed
 from ghest_rt.studies.rivals.angle_errors import Answers, truth_track
 from ghest_rt.studies.rivals.contenders import CONTENDERS
 from ghest_rt.studies.rivals.coupled_chain import CoupledChain
@@ -21,7 +22,6 @@ from ghest_rt.studies.rivals.exoskeleton_alone import ExoskeletonAlone
 from ghest_rt.studies.rivals.inertial import ImuProfile, ImuTrack, InertialEstimator, simulate_imus
 from ghest_rt.studies.rivals.neutral import NeutralCalibration, calibrate
 from ghest_rt.studies.rivals.swivel import SwivelAngle
-from ghest_rt.studies.session.observed import Observed
 
 WITHOUT_CAMERAS = ("exoskeleton", "coupled_chain", "swivel", "swivel_wrist", "inertial")
 """The rivals that look at no marker."""

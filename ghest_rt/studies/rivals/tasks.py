@@ -13,13 +13,13 @@ from ghest_rt.messages.results import MarkerObservation
 from ghest_rt.simulation.command import SimulateOptions, build_world
 from ghest_rt.simulation.world import World
 from ghest_rt.studies.engine.task import Result, Task
+from ghest_rt.studies.observing.observed import Observed, observe
+from ghest_rt.studies.observing.packing import unpack
+from ghest_rt.studies.observing.scenario import Scenario
+from ghest_rt.studies.observing.tasks import observe_task
 from ghest_rt.studies.rivals.angle_errors import Answers, error_statistics, girdle_turn_deg, simple_forecasts_deg, truth_track
 from ghest_rt.studies.rivals.running import inertial_after_rest_deg, run_without_cameras
 from ghest_rt.studies.session.estimating import estimate_session
-from ghest_rt.studies.session.observed import Observed, observe
-from ghest_rt.studies.session.packing import unpack
-from ghest_rt.studies.session.scenario import Scenario
-from ghest_rt.studies.session.tasks import observe_task
 from ghest_rt.vision.aruco import ArucoDetector
 
 _HERE = "ghest_rt.studies.rivals.tasks"

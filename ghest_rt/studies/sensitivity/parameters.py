@@ -4,8 +4,8 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
+from ghest_rt.studies.observing.scenario import MountError, Scenario
 from ghest_rt.studies.paper_values import PARAMETERS
-from ghest_rt.studies.session.scenario import MountError, Scenario
 
 Group = Literal["shift", "turn", "both", "mount_shift", "mount_turn", "encoder"]
 

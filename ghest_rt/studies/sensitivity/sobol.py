@@ -16,11 +16,11 @@ from ghest_rt.studies.engine.store import ResultStore
 from ghest_rt.studies.engine.tables import finite
 from ghest_rt.studies.engine.task import Result, Task
 from ghest_rt.studies.movements import frames_of
+from ghest_rt.studies.observing.packing import unpack
+from ghest_rt.studies.observing.scenario import Scenario
+from ghest_rt.studies.observing.tasks import observe_task
 from ghest_rt.studies.sensitivity.parameters import Group, Parameter, further_parameters, paper_parameters
 from ghest_rt.studies.sensitivity.surrogate import Surrogate
-from ghest_rt.studies.session.packing import unpack
-from ghest_rt.studies.session.scenario import Scenario
-from ghest_rt.studies.session.tasks import observe_task
 
 RANGES: dict[Group, float] = {"shift": 0.020, "turn": 5.0, "mount_shift": 0.001, "mount_turn": 0.5, "encoder": 0.5}
 """Each parameter is uniform within plus and minus this: metres or degrees."""

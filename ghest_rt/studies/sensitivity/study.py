@@ -4,17 +4,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, cast
 
-from ghest_rt.estimation.pipeline import Method
 from ghest_rt.studies.engine.run import Executor, Progress, run_tasks, spent_cpu_s
 from ghest_rt.studies.engine.store import ResultStore
 from ghest_rt.studies.engine.tables import finite
 from ghest_rt.studies.engine.task import Task
 from ghest_rt.studies.movements import METHODS, Movements, frames_of
+from ghest_rt.studies.observing.tasks import observe_task
 from ghest_rt.studies.paper_values import STEP_M, STEPS
 from ghest_rt.studies.sensitivity.derivative import eq11_relative_sensitivity
 from ghest_rt.studies.sensitivity.parameters import Group, Parameter, further_parameters, paper_parameters
 from ghest_rt.studies.session.errors import QUANTITIES
-from ghest_rt.studies.session.tasks import judge_task, observe_task
+from ghest_rt.studies.session.tasks import judge_task
+from ghest_rt.vision.station import Method
 
 Row = dict[str, object]
 

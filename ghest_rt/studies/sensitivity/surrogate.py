@@ -17,8 +17,8 @@ from ghest_rt.geometry.so3 import Array, exp_so3
 from ghest_rt.kinematics.paper_chain import eq7_e_from_marker
 from ghest_rt.messages.results import TruthSample
 from ghest_rt.studies.metrics import ErrorAccumulator
+from ghest_rt.studies.observing.observed import Observed
 from ghest_rt.studies.sensitivity.parameters import AXES, Group, Parameter
-from ghest_rt.studies.session.observed import Observed
 from ghest_rt.sync.pose_track import PoseSample
 
 

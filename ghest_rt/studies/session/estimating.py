@@ -9,12 +9,13 @@ from ghest_drivers.samples import CameraInfo, EncoderSample, RgbdFrame
 from ghest_rt.config.load import LoadedStation
 from ghest_rt.errors import BadInputError
 from ghest_rt.estimation.offline import estimate_events
-from ghest_rt.estimation.pipeline import Method, Pipeline
+from ghest_rt.estimation.pipeline import Pipeline
 from ghest_rt.geometry.se3 import transform
 from ghest_rt.geometry.so3 import exp_so3
 from ghest_rt.messages.results import GhEstimate, MarkerObservation
-from ghest_rt.studies.session.observed import Observed
-from ghest_rt.studies.session.scenario import MountError
+from ghest_rt.studies.observing.observed import Observed
+from ghest_rt.studies.observing.scenario import MountError
+from ghest_rt.vision.station import Method
 
 _NO_COLOR = np.zeros((0, 0, 3), dtype=np.uint8)
 

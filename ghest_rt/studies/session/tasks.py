@@ -1,24 +1,16 @@
-"""The tasks that simulated sessions are made of: observe one, and judge one method by method."""
+"""The task that judges a simulated session method by method."""
 
 from collections.abc import Sequence
 
 from ghest_rt.studies.engine.task import Result, Task
+from ghest_rt.studies.observing.observed import Observed, with_markers_of
+from ghest_rt.studies.observing.packing import unpack
+from ghest_rt.studies.observing.scenario import Scenario
+from ghest_rt.studies.observing.tasks import observe_task
 from ghest_rt.studies.session.errors import error_statistics
 from ghest_rt.studies.session.estimating import estimate_session
-from ghest_rt.studies.session.observed import Observed, observe, with_markers_of
-from ghest_rt.studies.session.packing import pack, unpack
-from ghest_rt.studies.session.scenario import Scenario
 
-_HERE = "ghest_rt.studies.session.tasks"
-_FRAME_COST = {"paper": 1.0, "sr300": 16.0}
 _ESTIMATE_COST = 0.15
-_SETUP_COST = 30.0
-
-
-def observe_task(scenario: Scenario, frames: int) -> Task:
-    """Return the task that renders a session and keeps what was seen; `frames` of each camera, about, for its cost."""
-    cost = _SETUP_COST + 2 * frames * _FRAME_COST[scenario.sensor]
-    return Task.of(f"{_HERE}:observe_session", scenario.model_dump(mode="json"), cost=cost)
 
 
 def judge_task(scenario: Scenario, frames: int, base: Task | None = None) -> Task:
@@ -27,25 +19,24 @@ def judge_task(scenario: Scenario, frames: int, base: Task | None = None) -> Tas
     Args:
         scenario: The scenario.
         frames: Frames of each camera, about, for its cost.
-        base: The task of the undisturbed session; only the cameras whose markers move are rendered then. None renders both.
+        base: The `observe_task` of the undisturbed session; only the cameras whose markers move are rendered then. None
+            renders both.
     """
-    cameras = 2 if base is None else len(scenario.moved_markers)
-    cost = cameras * frames * _FRAME_COST[scenario.sensor] + len(scenario.methods) * frames * _ESTIMATE_COST
-    needs = () if base is None else (base,)
-    parameters = scenario.model_dump(mode="json")
-    return Task.of(f"{_HERE}:judge_session", parameters, needs=needs, cost=cost + (_SETUP_COST if cameras else 0.0))
-
-
-def observe_session(parameters: dict[str, object], needs: Sequence[Result]) -> Result:
-    """Carry out an `observe_task`."""
-    scenario = Scenario.model_validate(parameters)
-    return pack(observe(scenario.world(), scenario.methods), scenario.sensor)
+    needs: tuple[Task, ...]
+    if base is None:
+        needs = (observe_task(scenario, frames),)
+    elif scenario.moved_markers:
+        needs = (base, observe_task(scenario, frames, moved_only=True))
+    else:
+        needs = (base,)
+    cost = len(scenario.methods) * frames * _ESTIMATE_COST
+    return Task.of(f"{__name__}:judge_session", scenario.model_dump(mode="json"), needs=needs, cost=cost)
 
 
 def judge_session(parameters: dict[str, object], needs: Sequence[Result]) -> Result:
     """Carry out a `judge_task`: the error statistics by method."""
     scenario = Scenario.model_validate(parameters)
-    session = _session(scenario, needs)
+    session = _session(needs)
     return Result(
         {
             method: error_statistics(
@@ -59,12 +50,8 @@ def judge_session(parameters: dict[str, object], needs: Sequence[Result]) -> Res
     )
 
 
-def _session(scenario: Scenario, needs: Sequence[Result]) -> Observed:
-    if not needs:
-        return observe(scenario.world(), scenario.methods)
-    base = unpack(needs[0])
-    if not scenario.moved_markers:
-        return base
-    world = scenario.world()
-    cameras = [name for name, camera in world.station.config.cameras.items() if camera.marker in scenario.moved_markers]
-    return with_markers_of(base, observe(world, scenario.methods, cameras), cameras)
+def _session(needs: Sequence[Result]) -> Observed:
+    first, *others = map(unpack, needs)
+    for moved in others:
+        first = with_markers_of(first, moved)
+    return first

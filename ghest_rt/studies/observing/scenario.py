@@ -8,11 +8,11 @@ from pydantic import Field
 
 from ghest_rt.config.strict import Strict
 from ghest_rt.errors import BadInputError
-from ghest_rt.estimation.pipeline import Method
 from ghest_rt.simulation.command import SimulateOptions, build_world
 from ghest_rt.simulation.disturbances import SoftTissueName, parse_shift, parse_turn
 from ghest_rt.simulation.therapy import find_movement
 from ghest_rt.simulation.world import World
+from ghest_rt.vision.station import Method
 
 Vector3 = tuple[float, float, float]
 
@@ -61,16 +61,13 @@ class Scenario(Strict):
             return frozenset(("m0", "m1"))
         return frozenset(text.partition(":")[0] for text in (*self.shifts, *self.turns))
 
+    def as_seen(self) -> "Scenario":
+        """Return the session as the cameras meet it: nothing told wrongly to the estimator, that is."""
+        return self.model_copy(update={"mount_errors": {}, "encoder_bias_rad": {}})
+
     def undisturbed(self) -> "Scenario":
         """Return the session with every marker where the calibration says, and nothing told wrongly."""
-        return Scenario(
-            movement=self.movement,
-            motion=self.motion,
-            sensor=self.sensor,
-            seed=self.seed,
-            duration_s=self.duration_s,
-            methods=self.methods,
-        )
+        return self.as_seen().model_copy(update={"shifts": (), "turns": (), "soft_tissue": "none"})
 
     def world(self) -> World:
         """Set up the simulated clinic.

@@ -6,11 +6,11 @@ import numpy as np
 
 from ghest_drivers.samples import EncoderSample
 from ghest_rt.config.load import LoadedStation, parse_station
-from ghest_rt.estimation.pipeline import Method
 from ghest_rt.messages.results import MarkerObservation, MarkerStatus, TruthSample
 from ghest_rt.simulation.sensors import find_sensors
 from ghest_rt.studies.engine.task import Result
-from ghest_rt.studies.session.observed import Observed
+from ghest_rt.studies.observing.observed import Observed
+from ghest_rt.vision.station import Method
 
 _STATUS = tuple(MarkerStatus)
 _TRUTH = ("m0_from_arm", "e_from_m0", "e_from_m1", "e_from_arm")

@@ -1,0 +1,1 @@
+"""What the cameras see of a simulated session: rendered and looked at once, whatever is estimated from it later."""
