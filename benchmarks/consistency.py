@@ -1,7 +1,8 @@
 """Does the filter's stated uncertainty hold? NEES, NIS and the share of 95 % intervals that contain the truth.
 
-`python -m benchmarks.consistency [--tuning] [--only TEXT] [--seeds 101,102,103]` from the project's root judges `fused` on
-simulated sessions of all conditions (benchmarks/conditions.py); sessions are simulated once and kept in out/benchmarks/.
+`python -m benchmarks.consistency [--tuning] [--reference] [--only TEXT] [--seeds 101,102,103]` from the project's root judges
+`fused` on simulated sessions of all conditions (benchmarks/conditions.py); sessions are simulated once and kept in
+out/benchmarks/. With `--reference` every one has a `[calibration.reference]` of its own, with errors drawn from its tolerances.
 """
 
 import argparse
@@ -9,7 +10,7 @@ import json
 import math
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
-from itertools import repeat
+from functools import partial
 
 import matplotlib as mpl
 import numpy as np
@@ -74,7 +75,7 @@ class _Listening:
 
     def add_marker(self, observation: MarkerObservation) -> None:
         self._estimator.add_marker(observation)
-        found = self._estimator.innovation()
+        found = self._estimator.innovation(observation.t_capture_ns)
         if observation.camera_from_marker is not None and found is not None:
             self.nis.append(found)
 
@@ -85,9 +86,10 @@ class _Listening:
             self.add_encoder(sample)
 
 
-def judge(condition: Condition, seed: int) -> Judged:
+def judge(condition: Condition, seed: int, *, reference: bool) -> Judged:
     """Run one session through the filter, each instant as it would have been published."""
-    session = observed(condition.seeded(seed), condition.vision)
+    calibration = f"{condition.group}: {condition.name}" if reference else None
+    session = observed(condition.seeded(seed), condition.vision, reference=calibration)
     estimator = estimator_for(session, "fused")
     if not isinstance(estimator, FusedEstimator):
         raise TypeError("method fused is made of something else")
@@ -119,6 +121,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--tuning", action="store_true", help="the seeds that the filter was tuned with, not the held-out ones")
     parser.add_argument("--seeds", help="these seeds, with commas between")
+    parser.add_argument("--reference", action="store_true", help="station files with [calibration.reference]")
     parser.add_argument("--only", default="", help="conditions whose group or name contains this")
     arguments = parser.parse_args()
     seeds = TUNING_SEEDS if arguments.tuning else HELD_OUT_SEEDS
@@ -129,10 +132,10 @@ def main() -> None:
     found: list[Judged] = []
     with ProcessPoolExecutor(2) as pool:
         for seed in seeds:
-            runs = pool.map(judge, chosen, repeat(seed))
+            runs = pool.map(partial(judge, seed=seed, reference=arguments.reference), chosen)
             found += track(runs, f"seed {seed}", total=len(chosen), console=Console(stderr=True))
     console.print(_table(found))
-    summary = {"seeds": list(seeds), **_summary(found)}
+    summary = {"seeds": list(seeds), "reference": arguments.reference, **_summary(found)}
     console.print_json(data=summary)
     FOLDER.mkdir(parents=True, exist_ok=True)
     (FOLDER / "consistency.json").write_text(json.dumps(summary, indent=2) + "\n")

@@ -18,6 +18,8 @@ from ghest_rt.simulation.calibrating import with_reference
 from ghest_rt.simulation.command import SimulateOptions, build_world
 from ghest_rt.simulation.faults import FaultyDevices
 from ghest_rt.simulation.fitting import fit_station
+from ghest_rt.studies.engine.salt import code_salt
+from ghest_rt.studies.observing.tasks import observe_session
 from ghest_rt.studies.truth import TruthTrack
 from ghest_rt.sync.grid import Grid
 from ghest_rt.vision.station import Method
@@ -50,13 +52,20 @@ class Session:
     movement_start_ns: int
 
 
-def observed(options: SimulateOptions, vision: Method) -> Session:
-    """Return a session as the detectors of method `vision` see it; `options.out` does not matter."""
+def observed(options: SimulateOptions, vision: Method, *, reference: str | None = None) -> Session:
+    """Return a session as the detectors of method `vision` see it; `options.out` does not matter.
+
+    Args:
+        options: What is simulated.
+        vision: The detectors.
+        reference: Names the calibration session whose `[calibration.reference]` the station file gets; None for none.
+    """
     body = anatomy(options.height_m)
     station = fit_station(load_station(options.station or shipped_station(options)), body)
     calibration = station.config.calibration
     geometry = (station.urdf_text, calibration.link_from_camera, calibration.m0_from_gh, calibration.m1_from_elw)
-    key = hashlib.sha256(repr((options, vision, geometry)).encode()).hexdigest()[:16]
+    code = code_salt(observe_session.__module__)
+    key = hashlib.sha256(repr((options, vision, geometry, code)).encode()).hexdigest()[:16]
     path = FOLDER / "observed" / f"{key}.pickle"
     if path.exists():
         session: Session = pickle.loads(path.read_bytes())
@@ -66,13 +75,8 @@ def observed(options: SimulateOptions, vision: Method) -> Session:
         part = path.with_suffix(".part")
         part.write_bytes(pickle.dumps(session))
         part.replace(path)
-    # What does not change the images may have changed in the station file since. Every condition has a calibration of its own.
-    return replace(session, station=with_reference(station, body, options.seed, _condition(options)))
-
-
-def _condition(options: SimulateOptions) -> str:
-    moves = (f"{move.kind} {move.text}" for move in options.marker_moves)
-    return "; ".join((options.movement or str(options.motion and options.motion.stem), *moves, options.soft_tissue))
+    # What does not change the images may have changed in the station file since.
+    return replace(session, station=station if reference is None else with_reference(station, body, options.seed, reference))
 
 
 def shipped_station(options: SimulateOptions) -> Path:

@@ -13,9 +13,8 @@ from ghest_rt.geometry.so3 import Array
 
 STATION_FORMAT = 1
 
-# Farther from its link the elbow cannot be, nor the scapula farther from its attitude in the neutral posture.
+# Farther from its link the elbow cannot be.
 _LONGEST_LINK_M = 1.0
-_MOST_TURN_DEG = 30.0
 
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]{1,64}$")]
 Row = tuple[float, float, float, float]
@@ -123,17 +122,11 @@ class CalibrationReference(Strict):
         default=None, ge=-90, le=90, description="Forearm ([elbow].axis) out of the elbow frame's y-z plane, about its y axis"
     )
     forearm_sigma_deg: float = Field(default=2.0, gt=0, le=45)
-    scapula_turn_deg: tuple[float, float, float] | None = Field(
-        default=None, description="Rotation vector of e_from_gh, zero when the posture of equation (8) is repeated exactly"
-    )
-    scapula_sigma_deg: float = Field(default=3.0, gt=0, le=45)
 
     @model_validator(mode="after")
     def _near(self) -> "CalibrationReference":
         if self.elbow_in_link_m is not None and np.linalg.norm(self.elbow_in_link_m) > _LONGEST_LINK_M:
             raise ValueError(f"elbow_in_link_m is more than {_LONGEST_LINK_M:g} m from its link; lengths are in metres")
-        if self.scapula_turn_deg is not None and np.linalg.norm(self.scapula_turn_deg) > _MOST_TURN_DEG:
-            raise ValueError(f"scapula_turn_deg is more than {_MOST_TURN_DEG:g} degrees: this is not the neutral posture")
         return self
 
 

@@ -28,13 +28,9 @@ def covariance_in_e(covariance: Array, e_from_camera: Array) -> Array:
         covariance: (6, 6) of (rotation error rad, translation error m) in camera axes.
         e_from_camera: (4, 4) pose of the camera in E, taken as exact.
     """
-    R = e_from_camera[:3, :3]
-    turned = np.empty((6, 6))
-    turned[:3, :3] = R @ covariance[:3, :3] @ R.T
-    turned[:3, 3:] = R @ covariance[:3, 3:] @ R.T
-    turned[3:, :3] = turned[:3, 3:].T
-    turned[3:, 3:] = R @ covariance[3:, 3:] @ R.T
-    return turned
+    turn = np.zeros((6, 6))
+    turn[:3, :3] = turn[3:, 3:] = e_from_camera[:3, :3]
+    return np.asarray(turn @ covariance @ turn.T)
 
 
 def rotation_jacobians(

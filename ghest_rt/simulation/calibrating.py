@@ -53,12 +53,10 @@ def with_reference(station: LoadedStation, body: Anatomy, seed: int, session: st
     elbow, forearm_rad = _neutral(station, body)
     rng = np.random.default_rng((seed, *b"reference", *session.encode()))
     elbow = elbow + reference.elbow_sigma_m * rng.standard_normal(3)
-    scapula_deg = reference.scapula_sigma_deg * rng.standard_normal(3)
     forearm_offset_deg = reference.forearm_sigma_deg * rng.standard_normal()
     lines = ["[calibration.reference]", f"elbow_in_link_m = {np.round(elbow, 5).tolist()}"]
     if forearm_rad is not None:
         lines.append(f"forearm_twist_deg = {math.degrees(forearm_rad) + forearm_offset_deg:.3f}")
-    lines.append(f"scapula_turn_deg = {np.round(scapula_deg, 3).tolist()}")
     text = station.toml_text.rstrip("\n") + "\n\n" + "\n".join(lines) + "\n"
     return replace(station, toml_text=text, config=parse_station(text, station.source))
 

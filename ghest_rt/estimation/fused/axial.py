@@ -122,16 +122,18 @@ class AxialJudge:
         """Return the slip that was there from the beginning, its variance (rad, rad^2) and probability.
 
         What the forearm tells is hardly more certain than what it is to show. The slip is taken out only as far as it is
-        likelier than not; its variance says that it may be there all the same.
+        likelier than not; its variance says, at lower odds against it, that it may be there all the same.
         """
         turned = self.turned()
         if turned is None:
             return 0.0, 0.0, 0.0
         found, noise = -turned[0], turned[1]
         prior = self._tuning.axial_offset_rad**2
-        mean, there = found * prior / (noise + prior), _probability(found, noise, prior, self._tuning.axial_offset_cost)
+        cost = self._tuning.axial_offset_cost
+        mean, there = found * prior / (noise + prior), _probability(found, noise, prior, cost)
         taken = max(2.0 * there - 1.0, 0.0) * mean
-        remains = there * (noise * prior / (noise + prior) + (mean - taken) ** 2) + (1.0 - there) * taken**2
+        doubt = _probability(found, noise, prior, cost - self._tuning.axial_offset_doubt)
+        remains = doubt * (noise * prior / (noise + prior) + (mean - taken) ** 2) + (1.0 - doubt) * taken**2
         return taken, remains, there
 
 

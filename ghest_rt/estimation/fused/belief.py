@@ -32,7 +32,7 @@ class Streak:
         count: How many alike.
         length: How many in a row, alike or not.
         since_ns: Capture time of the first of those alike.
-        residual: (6,) innovation of the last: rotation rad, position m, E axes.
+        residual: (6,) innovation of the first of those alike: rotation rad, position m, E axes.
     """
 
     count: int = 0
@@ -75,6 +75,7 @@ class Belief:
         speed_rad_s: How fast camera r1 turns, averaged.
         agility: Factor on the process noise of m0 with the GH centre, and of m1.
         seen_ns: Capture time of the last measurement accepted of m0 and m1.
+        taken: How many have been accepted of m0 and m1 since the start.
         surprise: Of m0 and m1: (3,) the last innovation of the rotation, whitened.
         strain: Of m0 and m1: (3,) the last innovation of the GH centre's place, whitened.
         slack: Factor on the creep of the GH centre in the markers.
@@ -92,6 +93,7 @@ class Belief:
     P: Array
     agility: tuple[float, float]
     seen_ns: tuple[int, int]
+    taken: tuple[int, int] = (1, 1)
     speed_rad_s: float = 0.0
     surprise: tuple[Array, Array] = field(default_factory=lambda: (np.zeros(3), np.zeros(3)))
     strain: tuple[Array, Array] = field(default_factory=lambda: (np.zeros(3), np.zeros(3)))
@@ -112,6 +114,7 @@ class Belief:
             self.P,
             self.agility,
             self.seen_ns,
+            self.taken,
             self.speed_rad_s,
             self.surprise,
             self.strain,

@@ -1,6 +1,7 @@
 """Has a marker moved on its bone? Thirty-six answers weighed against each other; section 6 of docs/fused-estimator.md."""
 
 import itertools
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,16 +18,15 @@ LENGTH = 12
 DRIFT_SIZE = 13
 # What a posture consists of: scapula, GH centre, humerus, drift.
 _POSTURE = 9
-# What a posture depends on: of the belief's error states the poses, and the GH centre in the markers; then m0's turn
-# by the scapula (3), m1's turn about the arm by the forearm (1), the elbow's place against the beginning (3), and that of the
-# beginning against calibration (3).
-_KNOWN = 25
+# What a posture depends on: of the belief's error states the poses, and the GH centre in the markers; then m1's turn about
+# the arm by the forearm (1), the elbow's place against the beginning (3), and that of the beginning against calibration (3).
+_KNOWN = 22
 _FOUND = slice(9, _KNOWN)
 _ROWS = _KNOWN - 9
 _TOLD = slice(15, _KNOWN)
-_SCAPULA, _TWIST, _ELBOW, _FIRST_ELBOW = slice(6, 9), slice(9, 10), slice(10, 13), slice(13, 16)
+_TWIST, _ELBOW, _FIRST_ELBOW = slice(6, 7), slice(7, 10), slice(10, 13)
 # Whether a marker has moved is told by these; the rest says what it did.
-_WHETHER = 10
+_WHETHER = 7
 # What m1 did: it is so from the beginning of the session, or since then.
 _EVER, _SINCE = 1, 2
 # Evidence (twice a logarithm) that counts as clear when an answer is held against what was seen earlier.
@@ -43,6 +43,8 @@ _NEGLIGIBLE = 2e-2
 _DOUBTFUL = 1e-2
 # The answers are weighed this often.
 _WEIGH_NS = 150_000_000
+# A marker that has jumped is back if it is within this of where it was.
+_BACK_M, _BACK_RAD = 0.003, math.radians(1.0)
 # The arm length is taken anew into the geometry when it has changed by this much.
 _LENGTH_STEP_M = 0.004
 
@@ -138,7 +140,6 @@ class DriftJudge:
         found[:6] -= explained.expected
         variance = np.full(_ROWS - 6, _ANYTHING)
         for rows, value, known in (
-            (_SCAPULA, evidence.scapula, evidence.scapula_rad2),
             (_TWIST, evidence.twist_rad, evidence.twist_rad2),
             (_ELBOW, elbow_moved, elbow_m2),
             (_FIRST_ELBOW, evidence.elbow, evidence.elbow_m2),
@@ -157,15 +158,13 @@ class DriftJudge:
         for h, m, part in zip(kept, means, covariances, strict=True):
             apart = m - mean
             covariance += weights[h] * (part + np.outer(apart, apart))
-        if evidence.scapula is not None or evidence.elbow is not None:
-            covariance += self._doubt_of(belief, P, explained, found, mean)
+        covariance += self._doubt_of(belief, P, explained, found, mean)
         return self._compose(belief, explained, mean, covariance, weights)
 
     def _doubt_of(self, belief: Belief, P: Array, explained: "_Explained", found: Array, mean: Array) -> Array:
         """Return the (22, 22) variance about the mean of turns that are too unlikely to be taken out, and too likely to ignore.
 
-        A calibration session that is repeated to some degrees only cannot rule out a turn of less. Asked for as often as the
-        answers are weighed.
+        Nothing rules out a small turn that leaves the GH centre where it is. Asked for as often as the answers are weighed.
         """
         if self._doubted_ns != self._weighed_ns:
             self._doubted_ns = self._weighed_ns
@@ -231,14 +230,15 @@ class DriftJudge:
             G[rows, TURN[k]] = skew(there)
             variance[SLIDE[k]], variance[TURN[k]] = base.slide_variance, base.turn_variance
         G[3:6, LENGTH] = belief.base[1].turn.T @ along
-        G[_SCAPULA, TURN[0]] = np.eye(3)
         all_G = np.repeat(G[None], len(self._moved), axis=0)
         # The elbow as m1 shows it: displaced with the marker, and turned about its centre.
+        base = belief.base[1]
+        turned_elbow = -skew(self._m1_from_elw[:3, 3] - base.slide) @ base.turn
         for rows, then in ((_ELBOW, self._since), (_FIRST_ELBOW, self._moved & ~self._since)):
             all_G[:, rows, SLIDE[1]] = then[:, 2, None, None] * np.eye(3)
-            all_G[:, rows, TURN[1]] = then[:, 3, None, None] * -skew(self._m1_from_elw[:3, 3])
+            all_G[:, rows, TURN[1]] = then[:, 3, None, None] * turned_elbow
         # The forearm tells what was there from the beginning; what has come since, AxialJudge does.
-        all_G[:, _TWIST, TURN[1]] = ~self._since[:, 3, None, None] * along
+        all_G[:, _TWIST, TURN[1]] = ~self._since[:, 3, None, None] * (along @ base.turn)
         test, prior = self._test + variance, self._prior + variance
         weighted = all_G * prior[:, None, :]
         spread = weighted @ np.swapaxes(all_G, 1, 2) + _REGULAR
@@ -275,7 +275,9 @@ class DriftJudge:
         slides = [base.slide + drift[SLIDE[k]] for k, base in enumerate(belief.base)]
         turns = [_turned(base, drift[TURN[k]]) for k, base in enumerate(belief.base)]
         drifted = [
-            1.0 if base.jumped else float(weights[self._moved[:, 2 * k] | self._moved[:, 2 * k + 1]].sum())
+            1.0
+            if base.jumped and not _is_back(slides[k], turns[k])
+            else float(weights[self._moved[:, 2 * k] | self._moved[:, 2 * k + 1]].sum())
             for k, base in enumerate(belief.base)
         ]
         return Posture(
@@ -299,6 +301,11 @@ def _total(cost: Array) -> float:
     """Return the cost of any of these answers being right."""
     least = float(cost.min())
     return least - 2.0 * float(np.log(np.exp(-0.5 * (cost - least)).sum()))
+
+
+def _is_back(slide: Array, turn: Array) -> bool:
+    """Return whether a marker that has jumped is where calibration says, as far as calibration goes."""
+    return math.sqrt(float(slide @ slide)) < _BACK_M and math.sqrt(float(turn @ turn)) < _BACK_RAD
 
 
 def _turned(base: Base, turn: Array) -> Array:

@@ -1,6 +1,7 @@
 """The fused way: a filter over both markers and the encoders, its belief carried to the instant asked for."""
 
 import math
+from collections import Counter
 from collections.abc import Mapping
 
 import numpy as np
@@ -15,7 +16,7 @@ from ghest_rt.estimation.fused.filter import FusedFilter
 from ghest_rt.estimation.fused.freshness import Freshness, encoders_overdue
 from ghest_rt.estimation.fused.joints import JointForecast, Joints
 from ghest_rt.estimation.fused.process import Process
-from ghest_rt.estimation.fused.reference import Comparison, Reference
+from ghest_rt.estimation.fused.reference import Reference
 from ghest_rt.estimation.fused.report import drift_report, rotation_covariance
 from ghest_rt.estimation.fused.settled import Settled
 from ghest_rt.estimation.fused.sighting import Sighting
@@ -23,7 +24,7 @@ from ghest_rt.estimation.fused.timeline import Timeline
 from ghest_rt.estimation.fused.tuning import Tuning
 from ghest_rt.estimation.inputs import NO_FRAMES, NOT_SEEN, Inputs
 from ghest_rt.estimation.reasons import gravest
-from ghest_rt.estimation.uncertainty import euler_sigma_rad
+from ghest_rt.estimation.uncertainty import covariance_in_e, euler_sigma_rad
 from ghest_rt.geometry.se3 import inverse
 from ghest_rt.geometry.so3 import Array, log_so3, rot_z
 from ghest_rt.messages.results import GhEstimate, MarkerObservation, MarkerStatus, Reason, Status
@@ -73,9 +74,8 @@ class FusedEstimator:
         self._tuning = tuning or Tuning()
         self._filter = FusedFilter(self._tuning, Process(self._tuning, chain.m1_from_elw[:3, 3]))
         self._judge = DriftJudge(self._tuning, chain.m0_from_gh, chain.m1_from_elw, arm_length_m)
-        reference = reference or Reference()
-        self._comparison = Comparison(reference, self._tuning, chain.m0_from_gh, chain.m1_from_elw)
-        self._axial = AxialJudge(self._tuning, reference)
+        self._reference = reference or Reference()
+        self._axial = AxialJudge(self._tuning, self._reference)
         self._elbow = Settled(6, self._tuning.reference_s, self._tuning.elbow_memory_s)
         self._unsettled_rad = _UNSETTLED * chain.sigma_limit_rad
         self._first_r1_from_m1: Array | None = None
@@ -87,6 +87,7 @@ class FusedEstimator:
         self._last: list[Sighting | None] = [None, None]
         self._gh_from_m0 = inverse(chain.m0_from_gh)
         self._timeline: Timeline | None = None
+        self._counts: Counter[str] = Counter()
         self._default = np.diag(np.repeat((self._tuning.default_rotation_rad**2, self._tuning.default_position_m**2), 3))
         self._floor = np.diag(np.repeat((self._tuning.rotation_floor_rad**2, self._tuning.position_floor_m**2), 3))
 
@@ -103,27 +104,33 @@ class FusedEstimator:
         self._freshness.saw(which, observation.t_arrival_ns - observation.t_capture_ns)
         sighting = self._sighting(observation, which)
         if sighting is None:
+            self._counts[f"{observation.marker}_without_joints"] += 1
             return
         self._last[which] = sighting
         if self._timeline is None:
             self._start()
         else:
             self._timeline.add(sighting)
+            if self._timeline.mistaken:
+                self._timeline = None
+                self._start()
+                return
             belief = self._timeline.belief_at(sighting.t_ns)
-            if belief is not None and belief.seen_ns[which] == sighting.t_ns:
-                self._freshness.took(which, sighting.t_ns)
-            if which and belief is not None and sighting.t_ns - self._compared_ns >= _COMPARE_NS:
+            if belief is None or belief.seen_ns[which] != sighting.t_ns:
+                return
+            self._freshness.took(which, sighting.t_ns)
+            if which and sighting.t_ns - self._compared_ns >= _COMPARE_NS:
                 self._compared_ns = sighting.t_ns
                 self._compare_elbow(belief, sighting)
 
     def counts(self) -> dict[str, int]:
         """Return how many samples were not used, by reason."""
-        taken = {} if self._timeline is None else {reason: n for reason, n in self._timeline.counts.items() if n}
-        return {**self._inputs.counts(), **taken}
+        return {**self._inputs.counts(), **{reason: n for reason, n in self._counts.items() if n}}
 
-    def innovation(self) -> float | None:
-        """Return the normalised innovation squared (6 degrees of freedom) of the newest sighting; None before there is any."""
-        return None if self._timeline is None else self._timeline.newest.nis
+    def innovation(self, t_ns: int) -> float | None:
+        """Return the normalised innovation squared (6 degrees of freedom) of the sighting taken at `t_ns`; None if unknown."""
+        belief = None if self._timeline is None else self._timeline.belief_at(t_ns)
+        return None if belief is None or belief.t_ns != t_ns else belief.nis
 
     def estimate(self, t_ns: int) -> GhEstimate:
         """Return the GH joint at `t_ns`, forecast where nothing newer has come, or why there is none."""
@@ -135,25 +142,29 @@ class FusedEstimator:
         self._forecast(belief, t_ns, joints)
         stale = self._freshness.stale(belief.seen_ns, t_ns)
         first_elbow = self._elbow.first[:3] if self._elbow.started else None
-        evidence = self._comparison.evidence(belief, first_elbow, self._axial.turned())
+        evidence = self._reference.evidence(belief, first_elbow, self._axial.turned())
         posture = self._judge.judge(belief, *self._elbow_moved(belief), evidence)
         e_from_arm = step3_4_5_e_from_arm(posture.e_from_gh, posture.e_from_elw)
-        covariance = rotation_covariance(posture)
         newest_ns = {**self._inputs.newest_ns, "r0": belief.seen_ns[0], "r1": belief.seen_ns[1], "encoders": joints.newest_ns}
-        if e_from_arm is None or (stale and self._given_up(belief, t_ns, covariance)):
+        if e_from_arm is None:
             return lost(t_ns, self._why_unseen(stale, t_ns) if stale else Reason.UNCERTAIN, newest_ns)
         m0_from_gh = self._chain.m0_from_gh
         m0_from_arm = eq10_m0_from_arm(posture.e_from_gh @ self._gh_from_m0, e_from_arm)
         gh_from_arm = gh_from_arm_rotation(m0_from_gh, m0_from_arm)
         slip = self._axial.slip.explained(posture.turned)
         slip_rad, slip_variance = slip.at(twist_rad(gh_from_arm))
+        covariance, of_arm = rotation_covariance(posture), posture.covariance[ARM, ARM]
         if slip_rad or slip_variance:
-            m0_from_arm[:3, :3] = m0_from_arm[:3, :3] @ rot_z(slip_rad)
-            gh_from_arm = gh_from_arm @ rot_z(slip_rad)
-            e_from_arm[:3, :3] = e_from_arm[:3, :3] @ rot_z(slip_rad)
+            slipped = rot_z(slip_rad)
+            m0_from_arm[:3, :3] = m0_from_arm[:3, :3] @ slipped
+            gh_from_arm = gh_from_arm @ slipped
+            e_from_arm[:3, :3] = e_from_arm[:3, :3] @ slipped
             covariance = covariance + slip_variance * np.outer(gh_from_arm[:, 2], gh_from_arm[:, 2])
+            of_arm = of_arm + slip_variance * np.outer(e_from_arm[:3, 2], e_from_arm[:3, 2])
+        if stale and self._given_up(belief, t_ns, covariance):
+            return lost(t_ns, self._why_unseen(stale, t_ns), newest_ns)
         drift = drift_report(posture, slip, self._chain.m1_from_elw[:3, 1])
-        elbow = self._chain.elbow_angles(e_from_arm, joints.positions, posture.covariance[ARM, ARM])
+        elbow = self._chain.elbow_angles(e_from_arm, joints.positions, of_arm)
         flagged = drift.m0.flagged or drift.m1.flagged
         unsettled = belief.slack > _SETTLED_SLACK or math.sqrt(float(np.trace(covariance))) > self._unsettled_rad
         bridged = bool(stale) or self._freshness.returning() or encoders_overdue(joints.gap_ns)
@@ -179,9 +190,7 @@ class FusedEstimator:
         e_from_r1 = self._e_from_r1(joints.positions)
         e_from_camera = e_from_r1 if which else self._chain.e_from_camera(CAMERAS[0], joints.positions)
         covariance = self._default if observation.covariance is None else observation.covariance + self._floor
-        turned = np.zeros((6, 6))
-        turned[:3, :3] = turned[3:, 3:] = e_from_camera[:3, :3]
-        covariance = turned @ covariance @ turned.T
+        covariance = covariance_in_e(covariance, e_from_camera)
         if self._chain.needs_encoders(observation.camera):
             turn, place = self._encoder_variance(joints)
             covariance[[0, 1, 2], [0, 1, 2]] += self._tuning.encoder_rad**2 + turn
@@ -224,11 +233,10 @@ class FusedEstimator:
 
     def _compare_elbow(self, belief: Belief, sighting: Sighting) -> None:
         """Note where the exoskeleton has the elbow; let the forearm judge whether m1 slips about the arm."""
-        self._comparison.add(belief)
         base, R = belief.base[1], sighting.pose[:3, :3]
         elbow = sighting.pose[:3, 3] + R @ (base.turn.T @ (self._chain.m1_from_elw[:3, 3] - base.slide))
         r1_from_e = sighting.e_from_r1[:3, :3].T
-        r1_from_m1 = r1_from_e @ R
+        r1_from_m1 = r1_from_e @ R @ base.turn.T
         if self._first_r1_from_m1 is None:
             self._first_r1_from_m1 = r1_from_m1
         attitude = log_so3(r1_from_m1 @ self._first_r1_from_m1.T)
@@ -244,7 +252,7 @@ class FusedEstimator:
     def _start(self) -> None:
         m0, m1 = self._last
         if m0 is not None and m1 is not None and abs(m0.t_ns - m1.t_ns) <= _START_NS:
-            self._timeline = Timeline(self._filter, self._filter.start(m0, m1, self._chain.m0_from_gh))
+            self._timeline = Timeline(self._filter, self._filter.start(m0, m1, self._chain.m0_from_gh), self._counts)
 
     def _encoder_variance(self, joints: Joints) -> tuple[float, float]:
         """Return what the joints' variance means for camera r1: of its rotation (rad^2) and place (m^2), per axis.
@@ -271,7 +279,8 @@ class FusedEstimator:
         reasons = []
         for which in stale:
             newest = self._inputs.frames[CAMERAS[which]].before(t_ns)
-            unseen = newest is not None and newest[1].camera_from_marker is None and t_ns - newest[0] <= _START_NS
+            # A marker in frames that come, but not where it can be, is not seen either.
+            unseen = newest is not None and t_ns - newest[0] <= _START_NS
             reasons.append((NOT_SEEN if unseen else NO_FRAMES)[CAMERAS[which]])
         return gravest(*reasons)
 

@@ -35,6 +35,8 @@ _SAME_M = 0.003
 _CONTRADICTION = 8.0
 # Normalised innovations squared, per degree of freedom, above this are more than noise.
 _USUAL_NIS = 1.5
+# A marker that has been taken fewer times than this has not jumped: what was taken at first was wrong.
+_BELIEVED = 8
 # Shares of a surge, tried one after the other.
 _SURGE_SHARES = (0.05, 0.3, 1.0)
 # Standard deviations of a belief before the first pair of sightings.
@@ -53,6 +55,7 @@ class Outcome(StrEnum):
     OUTLIER = "outlier"  # too far from what was foretold
     JUMP = "jump"  # taken: the marker has moved on its bone
     REGAINED = "regained"  # taken after many outliers unlike each other: the body has moved as nothing foretold
+    MISTAKEN = "mistaken"  # not taken: the first sightings have been wrong, start anew
 
 
 class FusedFilter:
@@ -107,6 +110,8 @@ class FusedFilter:
             streak = _streak(belief.streaks[which], sighting.t_ns, innovation.residual)
             belief.streaks = _with(belief.streaks, which, streak)
             if self._has_jumped(belief, streak, update, sighting.t_ns):
+                if belief.taken[which] < _BELIEVED:
+                    return Outcome.MISTAKEN
                 outcome = Outcome.JUMP
                 moved = _moved_base(belief, which, sighting.pose, foretold.spread)
                 belief.base = _with(belief.base, which, moved)
@@ -115,7 +120,8 @@ class FusedFilter:
             else:
                 return Outcome.OUTLIER
             freed = self._freed(belief.P, which, everything=outcome is Outcome.JUMP)
-            update = _Update(freed, innovation, sighting.covariance)
+            belief.e_from_marker = _with(belief.e_from_marker, which, sighting.pose[:3, :3])
+            update = _Update(freed, innovation_of(belief, which, sighting.pose), sighting.covariance)
         update.apply(belief)
         belief.straighten(which)
         if outcome is Outcome.TAKEN:
@@ -123,6 +129,7 @@ class FusedFilter:
             self._loosen(belief, which, foretold.place_surprise())
         belief.streaks = _with(belief.streaks, which, Streak())
         belief.seen_ns = _with(belief.seen_ns, which, sighting.t_ns)
+        belief.taken = _with(belief.taken, which, belief.taken[which] + 1)
         return outcome
 
     def _surged(self, foretold: "_Update", P: Array, innovation: Innovation, sighting: Sighting) -> "_Update":

@@ -24,6 +24,10 @@ _SHARES, _SHARES_OF_TWO = (0.0, 0.5, 1.0), (0.5, 1.0)
 _FOLLOW = 0.04
 # Keeps the weights of forecasts without any error finite, rad^2.
 _LEAST_SQUARE = 1e-14
+# Samples so many steps apart are usual.
+_USUAL_STEPS = 1.5
+# A joint whose rate is not known may turn by as much, rad/s (m/s for prismatic joints).
+_UNKNOWN_RATE = 1.0
 # Mean square of the error of a parabola through three samples, carried on by one step, per that of a sample: 20 if samples err
 # independently; and movement itself makes more of it than samples do.
 _ONE_STEP = 60.0
@@ -36,14 +40,13 @@ class Joints:
     Attributes:
         positions: (n,) rad (m for prismatic joints), in the order of the encoder link.
         variance: (n,) of them, by resolution and forecast.
-        ahead_ns: How far the instant lies beyond the newest sample; 0 where samples lie around it.
-        gap_ns: Time between the samples around it, or `ahead_ns`.
+        gap_ns: Time between the samples around it, or how far it lies beyond the newest; after a silence the length of that,
+            until there are samples enough for a forecast.
         newest_ns: Latch time of the newest sample they rest on.
     """
 
     positions: Array
     variance: Array
-    ahead_ns: int
     gap_ns: int
     newest_ns: int
 
@@ -66,6 +69,8 @@ class JointForecast:
         self._max_gap_ns = max_gap_ns
         self._last: deque[EncoderSample] = deque(maxlen=max(_FITTED))
         self._step_s = 0.0
+        # How long the encoders were silent before samples that do not suffice for a forecast yet.
+        self._gap_ns = 0
         # (7, 3, n): of each forecast and joint, position, rate and half the acceleration at the newest sample.
         self._forecasts: Array | None = None
         # (7, n): mean squares of the errors of each forecast by one step; None before there are any.
@@ -83,25 +88,30 @@ class JointForecast:
             return
         if step_ns > _MOST_STEP_NS:
             last.clear()
-        elif self._forecasts is not None:
-            self._judge(sample, step_ns * 1e-9)
+            self._gap_ns = step_ns
+        elif last:
+            self._step_s = step_ns * 1e-9
+            if self._forecasts is not None:
+                self._judge(sample, self._step_s)
         last.append(sample)
-        self._step_s = step_ns * 1e-9
         self._forecasts = _forecasts(last) if len(last) >= min(_FITTED) else None
         self._mean = self._weighted()
+        if self._mean is not None:
+            self._gap_ns = 0
 
     def at(self, t_ns: int) -> Joints | None:
         """Return the joints at `t_ns`; None if the encoders say nothing about it."""
         found = self._encoders.at(t_ns, self._max_gap_ns)
         if not isinstance(found, Miss):
-            return Joints(found.positions, self._variance(0.0), 0, found.gap_ns, found.newest_ns)
+            return Joints(found.positions, self._between(found.gap_ns * 1e-9), found.gap_ns, found.newest_ns)
         if found is not Miss.NOT_YET or not self._last:
             return None
         newest_ns = self._last[-1].t_capture_ns
         ahead_ns = t_ns - newest_ns
         if ahead_ns > self._max_gap_ns:
             return None
-        return Joints(self._forecast(ahead_ns * 1e-9), self._variance(ahead_ns * 1e-9), ahead_ns, ahead_ns, newest_ns)
+        gap_ns = max(ahead_ns, self._gap_ns)
+        return Joints(self._forecast(ahead_ns * 1e-9), self._ahead(ahead_ns * 1e-9), gap_ns, newest_ns)
 
     def _forecast(self, ahead_s: float) -> Array:
         if self._mean is None:
@@ -115,15 +125,24 @@ class JointForecast:
         position, rate, bend = self._mean
         return np.asarray(position + ahead_s * rate + curved_s * (2.0 * ahead_s - curved_s) * bend)
 
-    def _variance(self, ahead_s: float) -> Array:
-        """Errors between samples are those of samples; those of a forecast grow from there as they have been seen to."""
-        if self._errors is None:
-            return np.zeros(len(self._last[-1].angles_rad) if self._last else 0)
-        if ahead_s == 0.0 or self._step_s == 0.0:
-            return self._of_sample
+    def _between(self, gap_s: float) -> Array:
+        """Return the variance between two samples: that of a sample, unless some are missing."""
+        if self._errors is None or gap_s <= _USUAL_STEPS * self._step_s:
+            return self._of_sample if self._errors is not None else self._unknown(0.0)
+        return self._grown(0.5 * gap_s)
+
+    def _ahead(self, ahead_s: float) -> Array:
+        """Return the variance of a forecast: it grows from that of a sample, as it has been seen to."""
+        return self._unknown(ahead_s) if self._errors is None or self._mean is None else self._grown(ahead_s)
+
+    def _grown(self, ahead_s: float) -> Array:
         reach = ahead_s / self._step_s
         growth = reach * reach if reach < 1.0 else reach**4
         return np.asarray(self._of_sample + growth * self._of_step)
+
+    def _unknown(self, ahead_s: float) -> Array:
+        size = len(self._last[-1].angles_rad) if self._last else 0
+        return np.full(size, (_UNKNOWN_RATE * ahead_s) ** 2) + (0.0 if self._errors is None else self._of_sample)
 
     def _judge(self, sample: EncoderSample, step_s: float) -> None:
         """Learn from what a new sample shows of the forecasts."""

@@ -16,7 +16,8 @@ class Innovation:
     """A measurement compared with what was foretold.
 
     Attributes:
-        residual: (6,) rotation error rad, position error m: measured against foretold, left perturbation, E axes.
+        residual: (6,) rotation error rad, position error m: measured against foretold, left perturbation, E axes. What of the
+            position does not follow from the rotation is exact, however large that is.
         H: (6, 24) its dependence on the error state.
         bend_m2: Variance of the position by the product of two errors, which H leaves out: without it, the noise of the
             rotation would pass for movement, which tells where the GH centre is.
@@ -44,9 +45,12 @@ def innovation_of(belief: Belief, marker: int, e_from_marker: Array) -> Innovati
     H[3:, _ROTATION[marker]] = skew(lever)
     H[3:, GH_IN_MARKER[marker]] = -R
     residual = np.empty(6)
-    residual[:3] = log_so3(e_from_marker[:3, :3] @ R.T)
-    residual[3:] = e_from_marker[:3, 3] - belief.p_gh + lever
+    measured = e_from_marker[:3, :3]
+    residual[:3] = log_so3(measured @ R.T)
+    across = H[3:, _ROTATION[marker]]
+    # The GH centre by the measured rotation, and what the believed one makes of that to first order.
+    residual[3:] = e_from_marker[:3, 3] - belief.p_gh + measured @ belief.gh_in_marker[marker] + across @ residual[:3]
     variance = belief.P.diagonal().tolist()
     bend = sum(variance[_ROTATION[marker]]) * sum(variance[GH_IN_MARKER[marker]]) / 3.0
-    without_rotation = np.concatenate((-H[3:, _ROTATION[marker]], _EYE_3), axis=1)
+    without_rotation = np.concatenate((-across, _EYE_3), axis=1)
     return Innovation(residual, H, bend, without_rotation)

@@ -22,14 +22,20 @@ class _Entry:
 
 
 class Timeline:
-    """The belief after every sighting so far, each taken in at its own capture time."""
+    """The belief after every sighting so far, each taken in at its own capture time.
 
-    def __init__(self, fused: FusedFilter, start: Belief) -> None:
-        """Go on from a belief."""
+    Attributes:
+        counts: How many sightings were not plainly taken, by marker and reason.
+        mistaken: Whether sightings say that the start was wrong.
+    """
+
+    def __init__(self, fused: FusedFilter, start: Belief, counts: Counter[str]) -> None:
+        """Go on from a belief and from counts."""
         self._filter = fused
         self._belief = start
         self._entries: deque[_Entry] = deque(maxlen=_DEPTH)
-        self.counts: Counter[str] = Counter()
+        self.counts = counts
+        self.mistaken = False
 
     @property
     def newest(self) -> Belief:
@@ -49,15 +55,15 @@ class Timeline:
         """Take a sighting in; one older than the filter can be wound back is counted and left aside."""
         later: list[Sighting] = []
         entries = self._entries
+        if sighting.t_ns < (entries[0].before if entries else self._belief).t_ns:
+            self.counts[f"{_MARKERS[sighting.marker]}_too_late"] += 1
+            return
         while entries and entries[-1].sighting.t_ns > sighting.t_ns:
             entry = entries.pop()
             later.append(entry.sighting)
             self._count(entry.sighting, entry.outcome, -1)
             self._belief = entry.before
-        if sighting.t_ns < self._belief.t_ns:
-            self.counts[f"{_MARKERS[sighting.marker]}_too_late"] += 1
-        else:
-            self._take(sighting)
+        self._take(sighting)
         for undone in reversed(later):
             self._take(undone)
 
@@ -66,6 +72,7 @@ class Timeline:
         self._belief = before.copy()
         outcome = self._filter.take(self._belief, sighting)
         self._entries.append(_Entry(sighting, before, outcome))
+        self.mistaken = self.mistaken or outcome is Outcome.MISTAKEN
         self._count(sighting, outcome, 1)
 
     def _count(self, sighting: Sighting, outcome: Outcome, by: int) -> None:

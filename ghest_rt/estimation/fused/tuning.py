@@ -52,23 +52,20 @@ class Tuning:
         exact_rad: What is left of a turn where there is no drift.
         slide_cost: Twice the logarithm of the odds against a slide.
         turn_cost: Twice the logarithm of the odds against a turn: m0, m1.
-        turn_doubt: Taken off the cost of a turn for the covariance, where there is a calibration session to compare with.
+        turn_doubt: Taken off the cost of a turn for the covariance.
         arm_length_m: Standard deviation of a calibrated arm length.
         axial_memory_s: The disagreement of forearm and m1 about the arm is averaged over this time; faster is movement.
         reference_s: Over this time at first it is learned how forearm and m1 agree, and where the elbow is.
         elbow_memory_s: Over which time the elbow's place is averaged after that.
         elbow_m: How far the elbow may wander in camera r1, per axis.
         elbow_lever_m: How much farther per radian that the arm turns there: the patient's axis is beside the exoskeleton's.
-        rhythm_sigma: Standard deviation of how far the scapula turns with the arm, rad per rad.
-        rhythm_memory_s: Over which time that is learned.
-        scapula_wander_rad: How far the scapula turns beyond that.
-        wander_memory_s: For how long.
         axial_noise_rad2_s: Spectral density of the forearm's wander against the arm during movement.
         axial_tolerance_rad: What forearm and m1 may come to disagree by without a slip.
         axial_shift_rad: Standard deviation of a slip of m1 about the arm, if there is one.
         axial_shift_cost: Twice the logarithm of the odds against it.
         axial_offset_rad: Standard deviation of a turn of m1 about the arm since the calibration, if there is one.
         axial_offset_cost: Twice the logarithm of the odds against it.
+        axial_offset_doubt: Taken off that for the covariance.
         lag_memory_s: Over which time the lag of m1 behind the axial rotation is learned.
         lag_sigma: Standard deviation of that lag, if there is one, rad per rad.
         lag_tolerance: What the forearm may seem to lead by without a lag.
@@ -124,16 +121,13 @@ class Tuning:
     elbow_memory_s: float = 0.3
     elbow_m: float = 0.0025
     elbow_lever_m: float = 0.015
-    rhythm_sigma: float = 0.2
-    rhythm_memory_s: float = 10.0
-    scapula_wander_rad: float = math.radians(2.0)
-    wander_memory_s: float = 0.5
     axial_noise_rad2_s: float = math.radians(0.5) ** 2 * 0.3
     axial_tolerance_rad: float = math.radians(1.0)
     axial_shift_rad: float = math.radians(8.0)
     axial_shift_cost: float = 8.0
     axial_offset_rad: float = math.radians(5.0)
-    axial_offset_cost: float = 3.0
+    axial_offset_cost: float = 8.0
+    axial_offset_doubt: float = 5.0
     lag_memory_s: float = 30.0
     lag_sigma: float = 0.3
     lag_tolerance: float = 0.04
