@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from ghest_rt.errors import BadInputError
 from ghest_rt.studies.engine.cluster import ClusterExecutor
 from ghest_rt.studies.engine.local import LocalExecutor
 from ghest_rt.studies.engine.run import run_tasks
@@ -51,6 +52,26 @@ def test_a_worker_killed_half_way_loses_no_result(cluster: Any, tmp_path: Path) 
     found = run_tasks(tasks, store, ClusterExecutor(cluster.scheduler_address), kill_one)
     assert killed
     assert [value["found"] for value in found] == [n**2 + 100 for n in range(24)]
+
+
+def test_a_cluster_without_a_worker_is_told_and_one_that_grows_is_used(tmp_path: Path) -> None:
+    log, store = tmp_path / "log", ResultStore(tmp_path / "tasks")
+    place = {"dashboard_address": ":0", "local_directory": str(tmp_path), "threads_per_worker": 1, "protocol": "tcp://"}
+    with distributed.LocalCluster(n_workers=0, processes=False, **place) as empty:
+        executor = ClusterExecutor(empty.scheduler_address, worker_s=0.5)
+        with pytest.raises(BadInputError, match=r"no worker; start one with `dask worker tcp://"):
+            run_tasks([square_task(1, log)], store, executor)
+        empty.scale(1)
+        most: list[int] = []
+
+        def grow(done: float, total: float) -> None:
+            empty.scale(4)
+            most.append(len([task for task in empty.scheduler.tasks.values() if task.state != "memory"]))
+
+        tasks = [square_task(n, log, sleep_s=0.05) for n in range(60)]
+        found = run_tasks(tasks, store, ClusterExecutor(empty.scheduler_address), grow)
+        assert [value["found"] for value in found] == [n**2 for n in range(60)]
+        assert max(most) > 4  # more than the first worker's share
 
 
 def test_a_session_judged_on_the_cluster_is_the_one_judged_here(cluster: Any, tmp_path: Path) -> None:

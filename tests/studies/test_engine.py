@@ -1,15 +1,17 @@
 """The study engine: nothing run twice, nothing finished lost."""
 
+from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from ghest_rt.cli.study.running import shown_progress, store_in
 from ghest_rt.errors import BadInputError, GhestError
+from ghest_rt.studies.engine import salt
 from ghest_rt.studies.engine.cluster import ClusterExecutor
 from ghest_rt.studies.engine.local import LocalExecutor
 from ghest_rt.studies.engine.run import run_tasks, spent_cpu_s
-from ghest_rt.studies.engine.salt import code_salt
 from ghest_rt.studies.engine.store import ResultStore
 from ghest_rt.studies.engine.task import Result, Task
 from tests.studies.study_tasks import square_task
@@ -79,18 +81,18 @@ def test_a_killed_worker_is_told_and_what_it_had_finished_is_kept(tmp_path: Path
 
 
 def test_the_key_depends_on_parameters_needs_and_code_but_not_on_the_cost() -> None:
-    def salt(kind: str) -> str:
+    def salted(kind: str) -> str:
         return f"code of {kind}"
 
     task = Task.of("a:b", {"x": 1, "y": [2]}, cost=3.0)
-    assert task.key(salt) == Task.of("a:b", {"y": [2], "x": 1}).key(salt)
+    assert task.key(salted) == Task.of("a:b", {"y": [2], "x": 1}).key(salted)
     others = [
         Task.of("a:b", {"x": 2, "y": [2]}),
         Task.of("a:c", {"x": 1, "y": [2]}),
         Task.of("a:b", {"x": 1, "y": [2]}, needs=(task,)),
     ]
-    assert len({other.key(salt) for other in (task, *others)}) == 4
-    assert task.key(salt) != task.key(lambda kind: f"newer code of {kind}")
+    assert len({other.key(salted) for other in (task, *others)}) == 4
+    assert task.key(salted) != task.key(lambda kind: f"newer code of {kind}")
 
 
 def test_a_change_of_the_code_beside_a_task_counts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -101,9 +103,26 @@ def test_a_change_of_the_code_beside_a_task_counts(tmp_path: Path, monkeypatch: 
     salts = []
     for text in ("one", "two", "one"):
         helper.write_text(f"# {text}\n")
-        code_salt.cache_clear()
-        salts.append(code_salt("kinds.tasks:run"))
+        salt.code_salt.cache_clear()
+        salts.append(salt.code_salt("kinds.tasks:run"))
     assert salts[0] == salts[2] != salts[1]
+
+
+def test_other_libraries_count_for_what_uses_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    kinds = ("ghest_rt.studies.observing.tasks:observe_session", "ghest_rt.studies.sensitivity.sobol:evaluate")
+
+    def salts(**versions: str) -> list[str]:
+        monkeypatch.setattr(salt, "version", lambda package: versions.get(package, "1"))
+        salt.code_salt.cache_clear()
+        salt._hash_of.cache_clear()
+        return [salt.code_salt(kind) for kind in kinds]
+
+    one, newer, mujoco = salts(), salts(SALib="2"), salts(mujoco="2")
+    assert (one[0] == newer[0], one[1] == newer[1]) == (True, False)
+    assert (one[0] == mujoco[0], one[1] == mujoco[1]) == (False, False)
+    monkeypatch.undo()
+    salt.code_salt.cache_clear()
+    salt._hash_of.cache_clear()
 
 
 def test_results_appear_whole_or_not_at_all(tmp_path: Path) -> None:
@@ -119,13 +138,24 @@ def test_results_appear_whole_or_not_at_all(tmp_path: Path) -> None:
         ResultStore(tmp_path / "file" / "below").save("k", Result({}), 0.0)
 
 
+def shortened(content: bytes) -> bytes:
+    return content[:-8]
+
+
+def flipped(content: bytes) -> bytes:
+    """One bit of a number: 16 in both files."""
+    at = content.index(b"16") if b"16" in content else content.index((16).to_bytes(8, "little"))
+    return content[:at] + bytes([content[at] ^ 1]) + content[at + 1 :]
+
+
+@pytest.mark.parametrize("damage", [shortened, flipped])
 @pytest.mark.parametrize("ending", ["json", "npz"])
-def test_a_damaged_result_is_made_again(tmp_path: Path, ending: str) -> None:
+def test_a_damaged_result_is_made_again(tmp_path: Path, ending: str, damage: Callable[[bytes], bytes]) -> None:
     log, store = tmp_path / "log", ResultStore(tmp_path / "tasks")
     task = square_task(4, log)
     run_tasks([task], store, LocalExecutor(1))
     file = next(store.folder.glob(f"*.{ending}"))
-    file.write_bytes(file.read_bytes()[:-8])
+    file.write_bytes(damage(file.read_bytes()))
     assert [value["found"] for value in run_tasks([task], store, LocalExecutor(1))] == [16]
     assert runs(log) == ["4", "4"]
     run_tasks([task], store, LocalExecutor(1))
@@ -138,6 +168,25 @@ def test_a_folder_that_cannot_be_written_to_is_refused_before_anything_runs(tmp_
         store_in(tmp_path / "file" / "study")
     store_in(tmp_path / "new")
     assert list((tmp_path / "new" / "tasks").iterdir()) == []
+
+
+def test_a_task_that_needs_a_damaged_result_has_it_made_again_first(tmp_path: Path) -> None:
+    log, store = tmp_path / "log", ResultStore(tmp_path / "tasks")
+    base = square_task(4, log)
+    run_tasks([base], store, LocalExecutor(1))
+    file = next(store.folder.glob("*.npz"))
+    file.write_bytes(flipped(file.read_bytes()))
+    assert [value["found"] for value in run_tasks([square_task(5, log, needs=(base,))], store, LocalExecutor(1))] == [41]
+    assert runs(log) == ["4", "4", "5"]
+
+
+def test_a_result_damaged_after_it_was_looked_for_is_told_with_the_remedy(tmp_path: Path) -> None:
+    store = ResultStore(tmp_path)
+    store.save("k", Result({}, {"x": np.array([16])}), 0.0)
+    file = tmp_path / "k.npz"
+    file.write_bytes(flipped(file.read_bytes()))
+    with pytest.raises(GhestError, match="run the same command again"):
+        store.load("k")
 
 
 @pytest.mark.parametrize("address", ["bogus", "node1:8786", "tcp://node1", "tcp://node1:port"])

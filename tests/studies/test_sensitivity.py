@@ -9,10 +9,11 @@ import pytest
 
 from ghest_rt.errors import BadInputError
 from ghest_rt.studies.engine.local import LocalExecutor
+from ghest_rt.studies.engine.run import run_tasks
 from ghest_rt.studies.engine.store import ResultStore
 from ghest_rt.studies.movements import Movements
 from ghest_rt.studies.observing.observed import observe
-from ghest_rt.studies.observing.scenario import Scenario
+from ghest_rt.studies.observing.scenario import MountError, Scenario
 from ghest_rt.studies.paper_values import MOVEMENTS, PARAMETERS
 from ghest_rt.studies.sensitivity.checks import checks
 from ghest_rt.studies.sensitivity.derivative import eq11_relative_sensitivity
@@ -21,6 +22,7 @@ from ghest_rt.studies.sensitivity.sobol import check_samples, run_sobol, sobol_p
 from ghest_rt.studies.sensitivity.study import Row, SensitivityPlan, run_sensitivity
 from ghest_rt.studies.sensitivity.summary import summarise
 from ghest_rt.studies.sensitivity.surrogate import Surrogate
+from ghest_rt.studies.session.tasks import judge_task
 
 
 @pytest.mark.parametrize("b", [0.0, 2e-4])
@@ -98,6 +100,31 @@ def test_the_surrogate_stands_for_the_rendered_pipeline(analysis: list[Row]) -> 
         position_m, orientation_deg = surrogate.errors({parameter: cast(float, row["amount"])})
         assert position_m == pytest.approx(cast(float, row["position_m_rms"]), rel=0.05, abs=5e-5)
         assert orientation_deg == pytest.approx(cast(float, row["orientation_deg_rms"]), rel=0.05, abs=0.03)
+
+
+def test_several_things_wrong_at_once_are_composed_as_in_the_scene(tmp_path: Path) -> None:
+    amounts = {
+        Parameter("shift", "m0", "y"): 0.012,
+        Parameter("shift", "m1", "x"): -0.01,
+        **{Parameter("turn", "m1", axis): 15.0 for axis in ("x", "y", "z")},
+        **{Parameter("turn", "m0", axis): -10.0 for axis in ("x", "z")},
+        **{Parameter("mount_turn", "r1", axis): 3.0 for axis in ("x", "y", "z")},
+        Parameter("encoder", "j2", ""): 1.0,
+    }
+    degrees = math.radians(3.0)
+    base = Scenario(movement="SIR", duration_s=0.2, methods=("refined",))
+    case = base.model_copy(
+        update={
+            "shifts": ("m0:y:0.012", "m1:x:-0.01"),
+            "turns": ("m1:x:15", "m1:y:15", "m1:z:15", "m0:x:-10", "m0:z:-10"),
+            "mount_errors": {"r1": MountError(rotation_rad=(degrees, degrees, degrees))},
+            "encoder_bias_rad": {"j2": math.radians(1.0)},
+        }
+    )
+    found = cast(Any, run_tasks([judge_task(case, 13)], ResultStore(tmp_path), LocalExecutor(1)))[0]["refined"]
+    position_m, orientation_deg = Surrogate(observe(base.world(), (), ()), 8).errors(amounts)
+    assert position_m == pytest.approx(found["position_m"]["rms"], rel=0.01)
+    assert orientation_deg == pytest.approx(found["orientation_deg"]["rms"], rel=0.01)
 
 
 def test_sobol_indices_know_what_matters(tmp_path: Path) -> None:

@@ -1,6 +1,7 @@
 """Tasks on a Dask cluster, named by its scheduler; the results come back here, so no folder needs to be shared."""
 
 import importlib
+from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -21,16 +22,18 @@ class ClusterExecutor:
     Attributes:
         address: Of the scheduler, such as tcp://node1:8786.
         connect_s: How long to wait for it.
+        worker_s: How long to wait for its first worker.
     """
 
     address: str
     connect_s: float = 10.0
+    worker_s: float = 60.0
 
     def run(self, jobs: Sequence[Job], store: ResultStore) -> Iterator[Outcome]:
         """Yield what became of each job as it ends.
 
         Raises:
-            BadInputError: The address is none, or no scheduler answers there.
+            BadInputError: The address is none, no scheduler answers there, or it has no worker.
             GhestError: Dask is not installed.
         """
         dask = _distributed()
@@ -40,25 +43,31 @@ class ClusterExecutor:
         except (OSError, ValueError) as error:
             raise BadInputError(f"--scheduler {self.address}: no Dask scheduler answers there: {error}") from error
         with client:
-            waiting = iter(jobs)
+            try:
+                client.wait_for_workers(1, timeout=self.worker_s)
+            except TimeoutError as error:
+                raise BadInputError(
+                    f"--scheduler {self.address}: the scheduler has no worker; start one with `dask worker {self.address}`"
+                ) from error
+            waiting = deque(jobs)
             under_way: dict[Any, Job] = {}
             completed = dask.as_completed(loop=client.loop)
 
-            def submit_next() -> None:
-                job = next(waiting, None)
-                if job is not None:
+            def submit() -> None:
+                # Never more under way than keeps every thread busy, as many as there are by now: what tasks need travels with
+                # them.
+                while waiting and len(under_way) < 2 * max(1, sum(client.nthreads().values())):
+                    job = waiting.popleft()
                     needs = [store.load(key) for key in job.need_keys]
                     future = client.submit(run_there, job.task, needs, key=f"ghest-{job.key}", pure=False)
                     under_way[future] = job
                     completed.add(future)
 
-            # Never more under way than keeps every thread busy: what tasks need travels with them.
-            for _ in range(2 * max(1, sum(client.nthreads().values()))):
-                submit_next()
+            submit()
             for future in completed:
-                job = under_way.pop(future)
-                submit_next()
-                yield _keep(job, future, store)
+                outcome = _keep(under_way.pop(future), future, store)
+                submit()
+                yield outcome
 
 
 def run_there(task: Task, needs: list[Result]) -> tuple[str, Result, float]:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import Protocol
 
 from ghest_rt.errors import GhestError
@@ -95,15 +96,16 @@ def _add_keys(task: Task, keys: dict[Task, str]) -> None:
 def _waves(tasks: Sequence[Task], keys: Mapping[Task, str], store: ResultStore) -> list[list[Job]]:
     """Return the jobs whose results are missing, those needed before those that need them."""
     level: dict[Task, int] = {}
+    has = cache(store.has)  # reads the whole result
 
     def visit(task: Task) -> int:
         if task not in level:
-            missing = [need for need in task.needs if not store.has(keys[need])]
+            missing = [need for need in task.needs if not has(keys[need])]
             level[task] = 1 + max((visit(need) for need in missing), default=-1)
         return level[task]
 
     for task in tasks:
-        if not store.has(keys[task]):
+        if not has(keys[task]):
             visit(task)
     waves: list[list[Job]] = [[] for _ in range(max(level.values(), default=-1) + 1)]
     for task, at in level.items():

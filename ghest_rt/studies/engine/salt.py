@@ -6,6 +6,7 @@ from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
+import ghest_drivers.samples
 import ghest_rt
 from ghest_rt.config.shipped import shipped_config_dir
 
@@ -29,7 +30,8 @@ _JUDGING = (
     "sync",
 )
 _OBSERVING = "ghest_rt.studies.observing"
-_LIBRARIES = ("numpy", "mujoco", "opencv-python-headless", "mink", "daqp", "scipy", "imufusion")
+_SEEING_LIBRARIES = ("numpy", "mujoco", "opencv-python-headless", "mink", "daqp", "scipy")
+_JUDGING_LIBRARIES = (*_SEEING_LIBRARIES, "imufusion", "SALib")
 
 
 @cache
@@ -41,7 +43,9 @@ def code_salt(kind: str) -> str:
     """
     module_name = kind.partition(":")[0]
     seeing = module_name.startswith(_OBSERVING)
-    digest = hashlib.sha256(_hash_of(_SEEING if seeing else _JUDGING).encode())
+    digest = hashlib.sha256(
+        (_hash_of(_SEEING, _SEEING_LIBRARIES) if seeing else _hash_of(_JUDGING, _JUDGING_LIBRARIES)).encode()
+    )
     spec = importlib.util.find_spec(module_name)
     if spec is not None and spec.origin is not None:
         module = Path(spec.origin)
@@ -52,15 +56,16 @@ def code_salt(kind: str) -> str:
 
 
 @cache
-def _hash_of(code: tuple[str, ...]) -> str:
+def _hash_of(code: tuple[str, ...], libraries: tuple[str, ...]) -> str:
     digest = hashlib.sha256()
-    for package in _LIBRARIES:
+    for package in libraries:
         digest.update(f"{package} {_version(package)}\0".encode())
     root = Path(ghest_rt.__file__).parent
     for name in code:
         path = root / name
         for file in sorted(path.rglob("*.py")) if path.is_dir() else [path]:
             digest.update(file.relative_to(root).as_posix().encode() + b"\0" + file.read_bytes())
+    digest.update(Path(ghest_drivers.samples.__file__).read_bytes())
     stations = shipped_config_dir()
     for file in sorted(path for path in stations.rglob("*") if path.suffix in {".toml", ".urdf"}):
         digest.update(file.relative_to(stations).as_posix().encode() + b"\0" + file.read_bytes())

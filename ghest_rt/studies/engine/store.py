@@ -1,8 +1,8 @@
 """Results on disk, one file per task, so that an interrupted study goes on where it was."""
 
+import hashlib
 import json
 import os
-import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,7 +18,8 @@ class ResultStore:
     """A folder of results named by their tasks' keys: `<key>.json`, with `<key>.npz` beside it where there are arrays.
 
     A result is there once its JSON file is: files appear whole or not at all, whatever happens to the process that writes.
-    One that was damaged afterwards does not count as there, and is made again.
+    One that was damaged afterwards, be it by a single bit, does not count as there, and is made again: values and arrays are
+    kept with their hashes.
 
     Attributes:
         folder: Where they are.
@@ -48,10 +49,14 @@ class ResultStore:
             found = self._read(key)
         except (OSError, ValueError):
             return False
-        if not isinstance(found, dict) or not {"cpu_s", "values"} <= set(found):
+        if not isinstance(found, dict) or not {"cpu_s", "values", "values_sha256", "arrays_sha256"} <= set(found):
             return False
-        with_arrays = found.get("arrays", self._npz(key).exists())
-        return not with_arrays or zipfile.is_zipfile(self._npz(key))
+        if _hash_of_json(found["values"]) != found["values_sha256"]:
+            return False
+        try:
+            return found["arrays_sha256"] is None or _hash_of_file(self._npz(key)) == found["arrays_sha256"]
+        except OSError:
+            return False
 
     def save(self, key: str, result: Result, cpu_s: float) -> None:
         """Keep a result.
@@ -66,12 +71,19 @@ class ResultStore:
         """
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
+            arrays_sha256 = None
             if result.arrays:
                 part = self.folder / f".{key}.{os.getpid()}.npz"
                 np.savez(part, allow_pickle=False, **result.arrays)
+                arrays_sha256 = _hash_of_file(part)
                 part.replace(self._npz(key))
             part = self.folder / f".{key}.{os.getpid()}.json"
-            kept = {"cpu_s": cpu_s, "values": result.values, "arrays": bool(result.arrays)}
+            kept = {
+                "cpu_s": cpu_s,
+                "values": result.values,
+                "values_sha256": _hash_of_json(result.values),
+                "arrays_sha256": arrays_sha256,
+            }
             part.write_text(json.dumps(kept), encoding="utf-8")
             part.replace(self._json(key))
         except OSError as error:
@@ -87,9 +99,15 @@ class ResultStore:
         return float(self._read(key)["cpu_s"])
 
     def load(self, key: str) -> Result:
-        """Return a result with its arrays."""
+        """Return a result with its arrays.
+
+        Raises:
+            GhestError: It was damaged since `has` said that it is there.
+        """
+        if not self.has(key):
+            raise GhestError(f"{self._json(key)}: a result was damaged; run the same command again, and it is made again")
         arrays = {}
-        if self._npz(key).is_file():
+        if self._read(key)["arrays_sha256"] is not None:
             with np.load(self._npz(key), allow_pickle=False) as file:
                 arrays = {name: file[name] for name in file.files}
         return Result(self.values(key), arrays)
@@ -103,3 +121,12 @@ class ResultStore:
 
     def _npz(self, key: str) -> Path:
         return self.folder / f"{key}.npz"
+
+
+def _hash_of_json(values: object) -> str:
+    return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()
+
+
+def _hash_of_file(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()

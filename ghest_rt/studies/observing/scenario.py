@@ -10,6 +10,7 @@ from ghest_rt.config.strict import Strict
 from ghest_rt.errors import BadInputError
 from ghest_rt.simulation.command import SimulateOptions, build_world
 from ghest_rt.simulation.disturbances import SoftTissueName, parse_shift, parse_turn
+from ghest_rt.simulation.texture import MarkerTexture
 from ghest_rt.simulation.therapy import find_movement
 from ghest_rt.simulation.world import World
 from ghest_rt.vision.station import Method
@@ -25,7 +26,7 @@ class MotionFile(Strict):
 
 
 class MountError(Strict):
-    """A camera that does not stand on its link as the calibration says: true link_from_camera = calibrated * exp(error)."""
+    """A camera that does not stand on its link as the calibration says: calibrated link_from_camera = true * exp(error)."""
 
     rotation_rad: Vector3 = Field(default=(0.0, 0.0, 0.0), description="Rotation vector, camera axes")
     translation_m: Vector3 = Field(default=(0.0, 0.0, 0.0), description="Camera axes")
@@ -69,8 +70,11 @@ class Scenario(Strict):
         """Return the session with every marker where the calibration says, and nothing told wrongly."""
         return self.as_seen().model_copy(update={"shifts": (), "turns": (), "soft_tissue": "none"})
 
-    def world(self) -> World:
+    def world(self, marker: MarkerTexture = "disks") -> World:
         """Set up the simulated clinic.
+
+        Args:
+            marker: What is printed on the marker plates.
 
         Raises:
             BadInputError: A part of the scenario cannot be used, or the motion file is not what it was.
@@ -87,6 +91,7 @@ class Scenario(Strict):
                 duration_s=self.duration_s,
                 marker_moves=(*map(parse_shift, self.shifts), *map(parse_turn, self.turns)),
                 soft_tissue=self.soft_tissue,
+                marker=marker,
             )
         )
 

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Any, cast
 
 import cv2
@@ -10,7 +9,6 @@ import numpy as np
 
 from ghest_rt.estimation.pipeline import lag_ns_of
 from ghest_rt.messages.results import MarkerObservation
-from ghest_rt.simulation.command import SimulateOptions, build_world
 from ghest_rt.simulation.world import World
 from ghest_rt.studies.engine.task import Result, Task
 from ghest_rt.studies.observing.observed import Observed, observe
@@ -45,7 +43,7 @@ def compare_task(scenario: Scenario, frames: int) -> Task:
 def answer_with_aruco(parameters: dict[str, object], needs: Sequence[Result]) -> Result:
     """Render the session with ArUco markers; return the rotations found from OpenCV's default corners and from refined ones."""
     scenario = Scenario.model_validate(parameters)
-    world = _aruco_world(scenario)
+    world = scenario.undisturbed().world(marker="aruco")
     seen = _observe_aruco(world)
     session = observe(world, (), ())
     arrays: dict[str, Any] = {}
@@ -92,20 +90,6 @@ def _aruco_answers(result: Result) -> dict[str, Answers]:
         key: Answers(arrays[f"{key}_t"].tolist(), [None if np.isnan(R[0, 0]) else R for R in arrays[f"{key}_R"]], lag_ns)
         for key in _REFINEMENT
     }
-
-
-def _aruco_world(scenario: Scenario) -> World:
-    return build_world(
-        SimulateOptions(
-            out=Path(),
-            movement=scenario.movement,
-            motion=None if scenario.motion is None else Path(scenario.motion.path),
-            sensor=scenario.sensor,
-            seed=scenario.seed,
-            duration_s=scenario.duration_s,
-            marker="aruco",
-        )
-    )
 
 
 def _observe_aruco(world: World) -> dict[str, dict[tuple[Any, str], list[MarkerObservation]]]:

@@ -50,7 +50,7 @@ class Surrogate:
             amounts: How much (m or deg) of each parameter of the groups shift, turn, mount_shift, mount_turn and encoder.
         """
         nominal_from_marker = {marker: self._moved(marker, amounts) for marker in ("m0", "m1")}
-        mount = {camera: _pose(camera, "mount_shift", "mount_turn", amounts) for camera in CAMERAS}
+        mount = {camera: _mount_error(camera, amounts) for camera in CAMERAS}
         bias = np.array([math.radians(amounts.get(Parameter("encoder", joint, ""), 0.0)) for joint in self._joints])
         accumulator = ErrorAccumulator()
         for truth, angles, camera_from_e in zip(self._truth, self._angles, self._camera_from_e, strict=True):
@@ -65,14 +65,22 @@ class Surrogate:
         return rms.position_m, math.degrees(rms.orientation_rad)
 
     def _moved(self, marker: str, amounts: Mapping[Parameter, float]) -> Array:
-        moved = _pose(marker, "shift", "turn", amounts)
-        return transform(moved[:3, :3], self._axes[marker] @ moved[:3, 3])
+        """Return nominal_from_marker: turns one after the other in the order of the axes, as the scene has them."""
+        turns = np.diag(_vector(marker, "turn", amounts))
+        turn = exp_so3(turns[0]) @ exp_so3(turns[1]) @ exp_so3(turns[2])
+        return transform(turn, self._axes[marker] @ _vector(marker, "shift", amounts))
 
 
-def _pose(what: str, shift: Group, turn: Group, amounts: Mapping[Parameter, float]) -> Array:
-    translation = [amounts.get(Parameter(shift, what, axis), 0.0) for axis in AXES]
-    rotation = [math.radians(amounts.get(Parameter(turn, what, axis), 0.0)) for axis in AXES]
-    return transform(exp_so3(np.array(rotation)), translation)
+def _mount_error(camera: str, amounts: Mapping[Parameter, float]) -> Array:
+    """Return what a calibrated mount is wrong by: one rotation vector, as `MountError` has it."""
+    return transform(exp_so3(_vector(camera, "mount_turn", amounts)), _vector(camera, "mount_shift", amounts))
+
+
+def _vector(what: str, group: Group, amounts: Mapping[Parameter, float]) -> Array:
+    """Return the amounts along or about the three axes, metres or radians."""
+    several = [Parameter(group, what, axis) for axis in AXES]
+    values = np.array([amounts.get(parameter, 0.0) for parameter in several])
+    return np.radians(values) if several[0].unit == "deg" else values
 
 
 def _sample(truth: TruthSample, e_from_marker: Array) -> PoseSample:
