@@ -3,12 +3,12 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
+from ghest_rt.errors import BadInputError
 from ghest_rt.simulation.opensim_file import read_motion_table
 from ghest_rt.simulation.sensors import find_sensors
 from ghest_rt.simulation.therapy import find_movement
-from ghest_rt.studies.observing.scenario import Scenario, motion_file
+from ghest_rt.studies.observing.scenario import Scenario, SensorName, motion_file
 from ghest_rt.studies.paper_values import MOVEMENTS
 from ghest_rt.vision.station import Method
 
@@ -35,17 +35,39 @@ class Movements:
         names = self.names or (() if self.motions else small.names)
         return Movements(names, self.motions, self.duration_s or small.duration_s)
 
-    def scenarios(self, sensor: Literal["paper", "sr300"], seed: int, methods: Sequence[Method]) -> list[Scenario]:
-        """Return the undisturbed session of every movement.
+    def scenarios(self, sensor: SensorName, seed: int, methods: Sequence[Method]) -> list[Scenario]:
+        """Return the undisturbed session of every movement, each once.
 
         Raises:
-            BadInputError: A movement is unknown, or a motion file cannot be read.
+            BadInputError: A movement is unknown, a motion file cannot be read, or its name is that of another movement.
         """
         names = self.names or (() if self.motions else MOVEMENTS)
+        names = tuple(dict.fromkeys(find_movement(name).name for name in names))
+        motions = _once(self.motions)
         common = {"sensor": sensor, "seed": seed, "duration_s": self.duration_s, "methods": tuple(methods)}
-        named = [Scenario.model_validate({"movement": find_movement(name).name, **common}) for name in names]
-        recorded = [Scenario.model_validate({"motion": motion_file(path), **common}) for path in self.motions]
+        named = [Scenario.model_validate({"movement": name, **common}) for name in names]
+        recorded = [Scenario.model_validate({"motion": motion_file(path), **common}) for path in motions]
         return named + recorded
+
+
+def _once(motions: Sequence[Path]) -> list[Path]:
+    """Return every file once; movements are told apart by the files' names without ending.
+
+    Raises:
+        BadInputError: Two files would be one movement, or one has the name of a movement of Table 2.
+    """
+    files = {path.resolve(): path for path in reversed(motions)}
+    named: dict[str, Path] = {}
+    for path in reversed(files.values()):
+        name = path.stem.lower()
+        if name in {movement.lower() for movement in MOVEMENTS}:
+            raise BadInputError(f"--motion {path}: {path.stem} is a movement of Table 2; give the file another name")
+        if name in named:
+            raise BadInputError(
+                f"--motion {path}: {named[name]} has the same name, and results tell movements apart by it; rename one of them"
+            )
+        named[name] = path
+    return list(named.values())
 
 
 def frames_of(scenario: Scenario) -> int:

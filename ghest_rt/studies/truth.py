@@ -1,6 +1,7 @@
 """Ground truth of a recording, at any instant."""
 
 from bisect import bisect_right
+from collections.abc import Iterable
 
 from ghest_rt.geometry.se3 import interpolate
 from ghest_rt.geometry.so3 import Array, slerp
@@ -13,6 +14,14 @@ class TruthTrack:
     def __init__(self) -> None:
         self._times_ns: list[int] = []
         self._samples: list[TruthSample] = []
+
+    @classmethod
+    def of(cls, samples: Iterable[TruthSample]) -> "TruthTrack":
+        """Return the truth at any instant from samples in the order of time."""
+        track = cls()
+        for sample in samples:
+            track.add(sample)
+        return track
 
     def __len__(self) -> int:
         return len(self._samples)

@@ -32,6 +32,7 @@ def made_up(rms: dict[tuple[str, str], float], seeds: int = 2) -> list[dict[str,
             "quantity": quantity,
             "rms": rms[quantity, movement] * (1.0 + 0.01 * seed),
             "sd": 1e-4,
+            "valid_fraction": 0.75,
             **BOX,
         }
         for seed in range(seeds)
@@ -57,6 +58,7 @@ def test_the_table_has_means_over_seeds_with_intervals_and_the_papers_beside() -
     assert (comb["paper_rms"], comb["paper_sd"], comb["seeds"]) == (1.0638, 0.5238, 2)
     mean = entries["orientation_deg", "mean"]
     assert mean["paper_rms"] == 0.88921
+    assert comb["valid_fraction"] == mean["valid_fraction"] == 0.75
     assert mean["rms"] == pytest.approx(0.88921 * 1.005, rel=1e-3)
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ghest_rt.cli.study.running import shown_progress, store_in
+from ghest_rt.cli.study.running import opened, shown_progress
 from ghest_rt.errors import BadInputError, GhestError
 from ghest_rt.studies.engine import salt
 from ghest_rt.studies.engine.cluster import ClusterExecutor
@@ -165,8 +165,8 @@ def test_a_damaged_result_is_made_again(tmp_path: Path, ending: str, damage: Cal
 def test_a_folder_that_cannot_be_written_to_is_refused_before_anything_runs(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     with pytest.raises(BadInputError, match=r"file/study.*cannot be written to.*name another folder"):
-        store_in(tmp_path / "file" / "study")
-    store_in(tmp_path / "new")
+        opened(tmp_path / "file" / "study", None, None)
+    opened(tmp_path / "new", None, None)
     assert list((tmp_path / "new" / "tasks").iterdir()) == []
 
 

@@ -53,15 +53,14 @@ def test_perturbations_are_tables_3_and_change_nothing_else() -> None:
     assert len(names) == len(set(names))
 
 
+PLAN = SensitivityPlan(
+    movements=Movements(("SIR",), duration_s=0.4), methods=("paper", "refined"), shifts_m=(0.0, 0.01, 0.02), every_amount=False
+)
+
+
 @pytest.fixture(scope="module")
 def analysis(tmp_path_factory: pytest.TempPathFactory) -> list[Row]:
-    plan = SensitivityPlan(
-        movements=Movements(("SIR",), duration_s=0.4),
-        methods=("paper", "refined"),
-        shifts_m=(0.0, 0.01, 0.02),
-        every_amount=False,
-    )
-    rows, cpu_s = run_sensitivity(plan, ResultStore(tmp_path_factory.mktemp("study")), LocalExecutor(1))
+    rows, cpu_s = run_sensitivity(PLAN, ResultStore(tmp_path_factory.mktemp("study")), LocalExecutor(1))
     assert cpu_s > 0.0
     return rows
 
@@ -139,26 +138,29 @@ def test_sobol_indices_know_what_matters(tmp_path: Path) -> None:
 
 
 def test_the_summary_tells_means_over_movements_and_judges_only_all_of_the_papers_movements(analysis: list[Row]) -> None:
-    summary = cast(dict[str, Any], summarise(analysis))
+    summary = summarise(PLAN, analysis, [], 16, 1.0)
     assert summary["checks"] == []
     at = {(r["method"], r["parameter"]): r for r in summary["at_largest"]}
     assert at["refined", "q4"]["orientation_deg_rms"] == rms(analysis, "refined", "q4", 0.02, "orientation_deg")
     assert {r["method"] for r in summary["mean_at_largest_shift"]} == {"paper", "refined"}
 
 
-def made_up(shift_deg: dict[str, float], *, start_m: float = 1e-3) -> list[Row]:
+def made_up(
+    shift_deg: dict[str, float], *, start_m: float = 1e-3, m0_scale: float = 1.1, method: str = "paper", sensor: str = "paper"
+) -> list[Row]:
     """Rows of an analysis in which errors add in quadrature."""
     rows: list[Row] = []
     for movement in MOVEMENTS:
         for name, (marker, axis) in PARAMETERS.items():
             q = np.array([0.0, 0.01, 0.02])
-            position = np.sqrt(start_m**2 + (0.5 * q * (1.1 if marker == "m0" else 1.0)) ** 2)
+            position = np.sqrt(start_m**2 + (0.5 * q * (m0_scale if marker == "m0" else 1.0)) ** 2)
             orientation = np.sqrt(1.0 + (shift_deg[name] * q / 0.02) ** 2)
             S = eq11_relative_sensitivity(q, position), eq11_relative_sensitivity(q, orientation)
             rows += [
                 {
+                    "sensor": sensor,
                     "movement": movement,
-                    "method": "paper",
+                    "method": method,
                     "group": "shift",
                     "parameter": name,
                     "what": marker,
@@ -180,5 +182,42 @@ def test_every_statement_of_the_paper_can_hold_and_can_fail() -> None:
     assert [check.holds for check in good] == [True] * 6
     assert all(check.evidence and check.explanation for check in good)
     turned_round = {"q1": 6.0, "q2": 6.0, "q3": 6.0, "q4": 5.0, "q5": 5.5, "q6": 5.0}
-    bad = checks(made_up(turned_round, start_m=1.0))
-    assert [check.holds for check in bad] == [True, False, False, False, False, False]
+    bad = checks(made_up(turned_round, start_m=1.0, m0_scale=0.9))
+    assert [check.holds for check in bad] == [False] * 6
+
+
+def test_the_papers_statements_are_of_its_own_sensor_and_movements() -> None:
+    rows = made_up(dict.fromkeys(PARAMETERS, 3.0))
+    assert checks(made_up(dict.fromkeys(PARAMETERS, 3.0), sensor="sr300")) == []
+    assert checks([row for row in rows if row["movement"] != "SIR"]) == []
+    assert len(checks(rows)) == 6
+
+
+def test_a_statement_about_a_marker_that_was_never_seen_does_not_hold_and_says_so() -> None:
+    rows = made_up({"q1": 3.0, "q2": 3.0, "q3": 2.0, "q4": 3.5, "q5": 0.2, "q6": 3.5})
+    for row in rows:
+        if (row["movement"], row["parameter"], row["amount"]) == ("SFE", "q5", 0.02):
+            row |= {"position_m_rms": None, "orientation_deg_rms": None, "S_position": None, "S_orientation": None}
+    found = checks(rows)
+    assert [check.holds for check in found] == [False, False, False, True, False, False]
+    assert "at 20 mm nothing is known of SFE q5" in found[0].evidence
+
+
+def test_refined_is_named_only_where_it_was_run() -> None:
+    shift_deg = {"q1": 3.0, "q2": 3.0, "q3": 2.0, "q4": 3.5, "q5": 0.2, "q6": 3.5}
+    alone, beside = made_up(shift_deg), [*made_up(shift_deg), *made_up(shift_deg, method="refined")]
+    assert not any("refined" in check.evidence + check.explanation for check in checks(alone))
+    assert "By method refined SAbAd" in checks(beside)[1].evidence
+    assert "Method refined, which hardly has one, shows it" in checks(beside)[1].explanation
+
+
+def test_on_rendered_sessions_the_papers_method_bears_out_what_geometry_says_of_it(tmp_path: Path) -> None:
+    plan = SensitivityPlan(movements=Movements(duration_s=0.2), methods=("paper",), shifts_m=(0.0, 0.01, 0.02), further=False)
+    rows, _ = run_sensitivity(plan, ResultStore(tmp_path), LocalExecutor(1))
+    found = {check.name: check for check in checks(rows)}
+    holds = {name.partition(" (")[0]: check.holds for name, check in found.items()}
+    assert len(holds) == 6
+    assert holds["The relative sensitivity of the position tends to 1"]
+    assert holds["Of m1's translations, those along the arm"]
+    assert holds["With marker drifts of 20 mm the orientation error is 3.6° or less"]
+    assert not any("nothing is known" in check.evidence for check in found.values())

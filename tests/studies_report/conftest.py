@@ -9,18 +9,17 @@ import numpy as np
 import pytest
 
 from ghest_rt.studies.accuracy.summary import table
-from ghest_rt.studies.compare import CompareSettings, compare
+from ghest_rt.studies.compare.study import CompareSettings, compare
 from ghest_rt.studies.engine.run import Job, Outcome
 from ghest_rt.studies.engine.store import ResultStore
-from ghest_rt.studies.engine.tables import write_summary
 from ghest_rt.studies.engine.task import Result
-from ghest_rt.studies.figures.style import new_figure
-from ghest_rt.studies.latency import LatencySettings, latency
-from ghest_rt.studies.latency_tasks import CANDIDATES
+from ghest_rt.studies.figures.compare import figures as compare_figures
+from ghest_rt.studies.figures.latency import figures as latency_figures
+from ghest_rt.studies.figures.style import Drawn, new_figure
+from ghest_rt.studies.latency.study import LatencySettings, latency
+from ghest_rt.studies.latency.tasks import CANDIDATES
 from ghest_rt.studies.movements import METHODS, Movements
-from ghest_rt.studies.report.compare_figures import draw_angles, draw_contenders
-from ghest_rt.studies.report.latency_figures import draw_latency
-from ghest_rt.studies.report.results import write_results
+from ghest_rt.studies.results import write_study
 from ghest_rt.studies.rivals.angle_errors import QUANTITIES as ANGLE_QUANTITIES
 from ghest_rt.studies.rivals.contenders import CONTENDERS
 from ghest_rt.studies.session.errors import QUANTITIES
@@ -41,6 +40,9 @@ def _values(job: Job) -> dict[str, object]:
         errors = {
             key: {
                 **dict.fromkeys(ANGLE_QUANTITIES, 0.01 if key == "fused" else 0.5 + k),
+                **{f"common_{name}": 0.5 + k for name in ANGLE_QUANTITIES},
+                **{f"fused_common_{name}": 0.01 for name in ANGLE_QUANTITIES},
+                "common_fraction": 1.0,
                 "lag_ms": 45.0,
                 "max_deg": 1.0,
                 "samples": 100,
@@ -74,7 +76,16 @@ def _values(job: Job) -> dict[str, object]:
 
 def accuracy_summary() -> dict[str, object]:
     rows: list[dict[str, Any]] = [
-        {"sensor": "paper", "method": method, "quantity": quantity, "movement": m, "seed": seed, "rms": 0.001 + seed, "sd": 0.1}
+        {
+            "sensor": "paper",
+            "method": method,
+            "quantity": quantity,
+            "movement": m,
+            "seed": seed,
+            "rms": 0.001 + seed,
+            "sd": 0.1,
+            "valid_fraction": 0.875,
+        }
         for method in METHODS
         for quantity in QUANTITIES
         for m in ("SAbAd", "SFE", "SIR", "COMB")
@@ -96,6 +107,8 @@ def sensitivity_summary() -> dict[str, object]:
     turn = {"group": "turn", "parameter": "turn m0 x", "what": "m0", "axis": "x", "amount": 10.0, "unit": "deg"}
     return {
         "study": "sensitivity",
+        "sensor": "paper",
+        "duration_s": 1.5,
         "paper": {"mean_orientation_deg_at_20_mm": 3.6},
         "undisturbed": [{"method": m, "orientation_deg_rms": 0.1, "position_m_rms": 0.001} for m in METHODS],
         "mean_at_largest_shift": [{"method": m, "amount_m": 0.02, "orientation_deg": 2.5, "position_m": 0.01} for m in METHODS],
@@ -104,9 +117,8 @@ def sensitivity_summary() -> dict[str, object]:
     }
 
 
-def picture(figure: Any, folder: Path, name: str) -> None:
-    folder.mkdir(parents=True, exist_ok=True)
-    figure.savefig(folder / f"{name}.png", dpi=40)
+def blank(*names: str) -> list[Drawn]:
+    return [Drawn(name, f"caption of {name}", new_figure(1.0, 1.0), folded=name.endswith("fused")) for name in names]
 
 
 @pytest.fixture(scope="session")
@@ -115,17 +127,12 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
     store = ResultStore(folder / "tasks")
     some = Movements(("SFE", "COMB"))
     compared = compare(CompareSettings(movements=some), store, Invented())
-    document = write_results(folder, "compare", compared, compared["rows"])  # type: ignore[arg-type]
-    picture(draw_contenders(document, "paper"), folder / "compare" / "figures", "contenders_paper")
-    picture(draw_angles(document, "paper"), folder / "compare" / "figures", "angles_paper")
+    write_study(folder, compared, {"rows": compared["rows"]}, compare_figures(compared))
     late = latency(
         LatencySettings(movements=some, computing_frames=1), store, Invented(), clock=iter(range(0, 10**12, 10**6)).__next__
     )
-    document = write_results(folder, "latency", late, late["rows"])  # type: ignore[arg-type]
-    picture(draw_latency(document), folder / "latency" / "figures", "latency")
-    write_summary(accuracy_summary(), folder / "accuracy")
-    write_summary(sensitivity_summary(), folder / "sensitivity")
-    for name in ("drift_by_method", "figure17_COMB_paper", "figure17_COMB_fused", "sobol_COMB", "further"):
-        picture(new_figure(1.0, 1.0), folder / "sensitivity" / "figures", name)
-    picture(new_figure(1.0, 1.0), folder / "accuracy" / "figures", "figure13_paper")
+    write_study(folder, late, {"rows": late["rows"]}, latency_figures(late))
+    write_study(folder, accuracy_summary(), {}, blank("figure13_paper"))
+    names = ("drift_by_method", "figure17_COMB_paper", "figure17_COMB_fused", "sobol_COMB", "further")
+    write_study(folder, sensitivity_summary(), {}, blank(*names))
     return folder

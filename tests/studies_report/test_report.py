@@ -10,8 +10,10 @@ from typer.testing import CliRunner
 
 from ghest_rt.cli.main import app
 from ghest_rt.errors import BadInputError
-from ghest_rt.studies.report.page import number
+from ghest_rt.studies.figures.style import Drawn, new_figure
+from ghest_rt.studies.numbers import number
 from ghest_rt.studies.report.write import write_report
+from ghest_rt.studies.results import write_study
 
 
 class Page(HTMLParser):
@@ -64,7 +66,7 @@ def test_every_study_has_its_tables_and_figures(page: str) -> None:
         "Does fused win?",
     ):
         assert heading in text
-    for caption in ("Figure 13", "Figure 17: COMB, method paper", "Figure 17: COMB, method fused", "Errors angle by angle"):
+    for caption in ("caption of figure13_paper", "caption of figure17_COMB_fused", "Errors angle by angle: sensor paper"):
         assert caption in text
     assert page.count("data:image/png") == 9
 
@@ -91,6 +93,38 @@ def test_what_does_not_hold_is_said(page: str) -> None:
 def test_the_same_results_give_the_same_page(results: Path, page: str, tmp_path: Path) -> None:
     write_report(results, tmp_path / "again.html")
     assert (tmp_path / "again.html").read_text(encoding="utf-8") == page
+
+
+def test_shares_and_what_was_played_are_told(page: str) -> None:
+    texts = Page(page).texts
+    assert texts.count("87.5") == 2 * 3 * 5  # valid, Tables 5 and 6, methods, movements and their mean
+    assert "valid (%)" in texts
+    assert "answered (%)" in texts
+    assert "first 1.5 s of each movement" in page
+    assert "8 s of each, in its own time" in page
+
+
+def test_what_an_earlier_run_left_is_removed_and_never_reported(tmp_path: Path) -> None:
+    def run(*names: str, rows: bool = True) -> None:
+        tables = {"rows": [{"x": 1.0}], "sobol": [{"y": 2.0}] if rows else []}
+        write_study(tmp_path, {"study": "accuracy"}, tables, [Drawn(n, f"<{n}>", new_figure(1, 1)) for n in names])
+
+    run("figure13_paper", "figure13_sr300")
+    figures = tmp_path / "accuracy" / "figures"
+    (figures / "of_mine.png").write_bytes(b"kept")
+    run("figure13_paper", rows=False)
+    assert sorted(path.name for path in figures.iterdir()) == [
+        *(f"figure13_paper.{ending}" for ending in ("pdf", "png", "svg")),
+        "of_mine.png",
+    ]
+    assert sorted(path.name for path in (tmp_path / "accuracy").iterdir()) == [
+        "figures",
+        "rows.csv",
+        "rows.parquet",
+        "summary.json",
+    ]
+    listed = json.loads((tmp_path / "accuracy" / "summary.json").read_text())
+    assert (listed["tables"], [figure["name"] for figure in listed["figures"]]) == (["rows"], ["figure13_paper"])
 
 
 def test_a_study_that_was_not_run_is_named_with_its_command(results: Path, tmp_path: Path) -> None:

@@ -8,8 +8,11 @@ import pytest
 from typer.testing import CliRunner
 
 from ghest_rt.cli.main import app
+from ghest_rt.errors import BadInputError
+from ghest_rt.studies.accuracy import study as accuracy_study
 from ghest_rt.studies.movements import Movements
 from ghest_rt.studies.rivals.contenders import CONTENDERS
+from ghest_rt.studies.sensitivity import sobol as sensitivity_sobol
 
 
 def run(*words: str) -> dict[str, object]:
@@ -60,6 +63,41 @@ def test_a_motion_file_that_is_not_there_is_named(tmp_path: Path) -> None:
     result = CliRunner().invoke(app, ["study", "compare", "--motion", str(tmp_path / "no.mot"), "--out", str(tmp_path)])
     assert result.exit_code != 0
     assert "no.mot" in str(result.exception)
+
+
+def test_a_movement_named_twice_is_played_once(tmp_path: Path) -> None:
+    path = tmp_path / "a.mot"
+    path.write_text("x")
+    (tmp_path / "sub").mkdir()
+    twice = Movements(("SFE", "sfe", "COMB"), (path, tmp_path / "sub" / ".." / "a.mot"))
+    assert [scenario.name for scenario in twice.scenarios("paper", 1, ("paper",))] == ["SFE", "COMB", "a"]
+
+
+@pytest.mark.parametrize(("name", "message"), [("a.mot", "the same name.*rename one"), ("Comb.mot", "movement of Table 2")])
+def test_movements_that_could_be_taken_for_one_another_are_refused(tmp_path: Path, name: str, message: str) -> None:
+    (tmp_path / "sub").mkdir()
+    files = tmp_path / "a.mot", tmp_path / "sub" / name
+    for path in files:
+        path.write_text("x")
+    with pytest.raises(BadInputError, match=message):
+        Movements(motions=files).scenarios("paper", 1, ("paper",))
+
+
+def test_what_is_named_counts_in_a_quick_study_too(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    class Planned(Exception):
+        """Ends a study once it is planned."""
+
+    plans = []
+
+    def keep(plan: object, *_: object) -> None:
+        plans.append(plan)
+        raise Planned
+
+    monkeypatch.setattr(accuracy_study, "run_accuracy", keep)
+    monkeypatch.setattr(sensitivity_sobol, "check_samples", keep)
+    for words in (["accuracy"], ["accuracy", "--seeds", "5"], ["sensitivity"], ["sensitivity", "--sobol-samples", "64"]):
+        CliRunner().invoke(app, ["study", *words, "--quick", "--out", str(tmp_path)])
+    assert [getattr(plan, "seeds", plan) for plan in plans] == [(1, 2), (1, 2, 3, 4, 5), 16, 64]
 
 
 def test_a_quick_study_is_of_what_was_named() -> None:

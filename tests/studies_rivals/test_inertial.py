@@ -58,6 +58,21 @@ def test_an_offset_of_the_gyroscope_makes_the_error_grow(comb: World) -> None:
     assert errors[-1] > errors[3] + 0.5
 
 
+def test_what_the_library_learns_of_the_offset_while_a_sensor_is_still_is_taken_off(comb: World) -> None:
+    still = comb.truth_at(comb.timeline.start_ns)
+
+    def error_deg(correct_offset: bool) -> float:
+        profile = replace(PERFECT, gyro_bias_dps=0.5)
+        scapula, arm = simulate_imus(lambda t_ns: replace(still, t_ns=t_ns), 0, 20_000_000_000, profile, seed=1)
+        estimator = InertialEstimator(scapula, arm, np.eye(3), np.eye(3), correct_offset=correct_offset)
+        before, after = (estimator.estimate(t_ns).gh_from_arm for t_ns in (10_000_000_000, 20_000_000_000))
+        assert before is not None
+        assert after is not None
+        return math.degrees(angle_between_rad(before, after))
+
+    assert error_deg(True) < 0.5 * error_deg(False)
+
+
 def test_a_wrong_attitude_at_the_start_is_kept(comb: World) -> None:
     scapula, arm = tracks(comb, PERFECT)
     turned = np.array([[math.cos(0.1), -math.sin(0.1), 0.0], [math.sin(0.1), math.cos(0.1), 0.0], [0.0, 0.0, 1.0]])

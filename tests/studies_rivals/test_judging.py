@@ -9,16 +9,16 @@ import pytest
 from ghest_rt.estimation.angles import rotation_from_clinical
 from ghest_rt.geometry.so3 import rot_y, rot_z
 from ghest_rt.messages.results import TruthSample
-from ghest_rt.studies.compare_verdicts import verdict
-from ghest_rt.studies.latency import effective_delay_ms
-from ghest_rt.studies.latency_tasks import PlayedAt
+from ghest_rt.studies.compare.verdicts import Tally, tally, verdict
+from ghest_rt.studies.latency.study import effective_delay_ms
+from ghest_rt.studies.latency.tasks import PlayedAt
 from ghest_rt.studies.rivals.angle_errors import (
     Answers,
     error_columns,
     error_statistics,
     girdle_turn_deg,
+    on_common_instants,
     simple_forecasts_deg,
-    truth_track,
 )
 from ghest_rt.studies.rivals.contenders import CONTENDERS
 from ghest_rt.studies.truth import TruthTrack
@@ -28,7 +28,7 @@ STEP_NS = 10_000_000
 
 
 def truth_of(gh: Callable[[float], np.ndarray], count: int = 30) -> TruthTrack:
-    return truth_track([sample(k * STEP_NS, gh(k * STEP_NS * 1e-9)) for k in range(count)])
+    return TruthTrack.of([sample(k * STEP_NS, gh(k * STEP_NS * 1e-9)) for k in range(count)])
 
 
 def sample(t_ns: int, gh: np.ndarray) -> TruthSample:
@@ -96,8 +96,9 @@ def test_a_steady_turn_is_foreseen_by_going_straight_on_and_a_jerk_is_not() -> N
 
 
 FUSED = {"orientation_deg": 0.1, "published_deg": 0.1, "flexion_deg": 0.05, "abduction_deg": 0.05, "rotation_deg": 0.05}
-WORSE = {name: 2.0 * value for name, value in FUSED.items()}
-BETTER = {name: 0.5 * value for name, value in FUSED.items()}
+WORSE = {name: 2.0 * value for name, value in FUSED.items()} | {"answered_fraction": 1.0}
+BETTER = {name: 0.5 * value for name, value in FUSED.items()} | {"answered_fraction": 1.0}
+FUSED["answered_fraction"] = 1.0
 
 
 def test_a_row_is_won_only_in_the_rotation_and_in_every_angle() -> None:
@@ -129,16 +130,60 @@ def test_a_row_that_is_lost_names_what_the_other_has_on_its_side() -> None:
 
 
 def test_who_never_answers_has_lost() -> None:
-    silent = dict.fromkeys(FUSED, math.nan)
-    assert verdict(CONTENDERS["aruco"], silent, FUSED, 45.0, 0.01).fused_wins
-    ours = verdict(CONTENDERS["aruco"], WORSE, silent, 45.0, 0.01)
+    nowhere = dict.fromkeys(FUSED, math.nan)
+    silent = {**nowhere, "answered_fraction": 0.0}
+    assert verdict(CONTENDERS["aruco"], silent, {**nowhere, "answered_fraction": 1.0}, 45.0, 0.01).fused_wins
+    ours = verdict(CONTENDERS["aruco"], {**nowhere, "answered_fraction": 0.75}, silent, 45.0, 0.01)
     assert not ours.fused_wins
     assert not ours.fused_wins_when_published
-    assert "rotation no answer against" in ours.verdict
+    assert "0.0 % of the instants against 75.0 %" in ours.verdict
     flexion = {**FUSED, "flexion_deg": math.nan}
     assert verdict(
         CONTENDERS["aruco"], {**WORSE, "flexion_deg": math.nan}, flexion, 45.0, 0.01
     ).fused_wins  # near its singularity
+
+
+def test_silence_wins_nothing() -> None:
+    seldom = verdict(CONTENDERS["aruco"], WORSE, {**FUSED, "answered_fraction": 0.6}, 45.0, 0.01)
+    assert not seldom.fused_wins
+    assert seldom.lost_in == ("answered_fraction",)
+    assert "answered are 60.0 % of the instants against 100 %" in seldom.verdict
+    started_later = verdict(CONTENDERS["aruco"], WORSE, {**FUSED, "answered_fraction": 0.995}, 45.0, 0.01)
+    assert started_later.fused_wins
+    rival = verdict(CONTENDERS["aruco"], {**WORSE, "answered_fraction": 0.6}, FUSED, 45.0, 0.01)
+    assert rival.fused_wins
+    assert "where both answer; answered are 100 % of the instants against 60.0 %" in rival.verdict
+
+
+def test_two_are_judged_where_both_answer() -> None:
+    truth = truth_of(lambda _: np.eye(3))
+    instants = [k * STEP_NS for k in range(1, 5)]
+    easy, hard = rot_z(0.01), rot_z(0.4)
+    theirs = Answers(instants, [easy, easy, None, None], 0)
+    fused = Answers(instants, [easy, None, hard, hard], 0)
+    found = on_common_instants(theirs, fused, truth)
+    assert found["common_fraction"] == 0.25
+    assert found["common_orientation_deg"] == found["fused_common_orientation_deg"] == pytest.approx(math.degrees(0.01))
+    assert error_statistics(fused, truth)["orientation_deg"] > 10.0
+    later = Answers([t_ns + 1 for t_ns in instants], fused.gh_from_arm, 0)
+    assert math.isnan(on_common_instants(theirs, later, truth)["common_orientation_deg"])
+
+
+def test_rows_are_counted_by_sensor_and_kind() -> None:
+    rows = [
+        {
+            "contender": "aruco",
+            "sensor": sensor,
+            "kind": kind,
+            "fused_wins": sensor == "paper",
+            "fused_wins_when_published": True,
+        }
+        for sensor in ("paper", "sr300")
+        for kind in ("therapy", "therapy", "recorded")
+    ]
+    assert tally(rows, "aruco", "paper", "therapy") == Tally(2, 2, 2)
+    assert tally(rows, "aruco", "sr300", "recorded") == Tally(1, 0, 1)
+    assert tally(rows, "swivel", "paper", "therapy").rows == 0
 
 
 def test_every_contender_says_what_its_publication_reports_and_what_to_bear_in_mind() -> None:

@@ -1,25 +1,39 @@
 """`ghest-rt study accuracy`: Tables 5 and 6 and Figure 13."""
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Any
 
-import typer
-
-from ghest_rt.cli.options import Json, Sensor
-from ghest_rt.cli.study.options import Duration, Methods, Motions, Movements, Out, Quick, Scheduler, Workers
+from ghest_rt.cli.options import Json
+from ghest_rt.cli.study.options import (
+    Duration,
+    Methods,
+    Motions,
+    Movements,
+    Out,
+    Quick,
+    Scheduler,
+    Seeds,
+    Sensors,
+    Workers,
+    chosen_methods,
+    chosen_sensors,
+    movements_of,
+)
 from ghest_rt.extras import need_extra
 
-_QUICK_DURATION_S = 2.0
+if TYPE_CHECKING:
+    from rich.console import Console
+
 _TITLES = {"m0_m": "m0\nmm", "m1_m": "m1\nmm", "position_m": "arm\nmm", "orientation_deg": "arm\n°"}
 
 
 def accuracy(
     out: Out = Path("out/study"),
-    sensor: Annotated[list[Sensor] | None, typer.Option(help="Only this sensor; again for more", show_default=False)] = None,
+    sensor: Sensors = None,
     method: Methods = None,
     movement: Movements = None,
     motion: Motions = None,
-    seeds: Annotated[int, typer.Option(min=1, metavar="N", help="Repeat with so many seeds, for confidence intervals")] = 3,
+    seeds: Seeds = None,
     duration: Duration = None,
     quick: Quick = False,
     workers: Workers = None,
@@ -27,95 +41,62 @@ def accuracy(
     as_json: Json = False,
 ) -> None:
     """Errors of the markers' and the arm's pose per movement: Tables 5 and 6, Figure 13."""
-    from dataclasses import asdict
-
-    from ghest_rt.cli.study.running import executor, shown_progress, store_in
+    from ghest_rt.cli.study.running import finish, opened, shown_progress
 
     need_extra("study", "a study")
-    from ghest_rt.cli.study.options import chosen_methods
-    from ghest_rt.studies.accuracy.study import AccuracyPlan, run_accuracy
-    from ghest_rt.studies.accuracy.summary import checks, table
-    from ghest_rt.studies.engine.tables import write_summary, write_tables
-    from ghest_rt.studies.figures.accuracy import draw_figure_13
-    from ghest_rt.studies.figures.style import save_figure
-    from ghest_rt.studies.movements import Movements as MovementsOf
+    from ghest_rt.studies.accuracy.study import QUICK, AccuracyPlan, run_accuracy
+    from ghest_rt.studies.accuracy.summary import summarise
+    from ghest_rt.studies.figures.accuracy import figures
+    from ghest_rt.studies.results import write_study
 
     plan = AccuracyPlan(
-        movements=MovementsOf(
-            tuple(m.value for m in movement or ()), tuple(motion or ()), duration or (_QUICK_DURATION_S if quick else None)
-        ),
-        sensors=tuple(s.value for s in sensor) if sensor else ("paper",) if quick else ("paper", "sr300"),
+        movements=movements_of(movement, motion, duration, QUICK if quick else None),
+        sensors=chosen_sensors(sensor, ("paper",) if quick else ("paper", "sr300")),
         methods=chosen_methods(method),
-        seeds=tuple(range(1, (2 if quick else seeds) + 1)),
+        seeds=tuple(range(1, (seeds or (2 if quick else 3)) + 1)),
     )
+    store, runs_on = opened(out, workers, scheduler)
     with shown_progress("study accuracy") as progress:
-        rows, cpu_s = run_accuracy(plan, store_in(out), executor(workers, scheduler), progress)
-    entries = table(rows)
-    folder = out / "accuracy"
-    write_tables(rows, folder, "rows")
-    write_tables(entries, folder, "table")
-    for name in plan.sensors:
-        save_figure(draw_figure_13(rows, name), folder / "figures", f"figure13_{name}")
-    found = [asdict(check) for check in checks(entries)]
-    document: dict[str, object] = {
-        "study": "accuracy",
-        "seeds": list(plan.seeds),
-        "duration_s": plan.movements.duration_s,
-        "cpu_s": cpu_s,
-        "table": entries,
-        "checks": found,
-    }
-    write_summary(document, folder)
-    if as_json:
-        from ghest_rt.cli.console import print_json
-
-        print_json(document)
-    else:
-        _show(document, folder)
+        rows, cpu_s = run_accuracy(plan, store, runs_on, progress)
+    summary = summarise(plan, rows, cpu_s)
+    document = write_study(out, summary, {"rows": rows, "table": summary["table"]}, figures(rows, plan.movements.duration_s))
+    finish(document, out, as_json, _show)
 
 
-def _show(document: dict[str, Any], folder: Path) -> None:
-    from rich import box
-    from rich.console import Console
-    from rich.table import Table
+def _show(document: dict[str, Any], console: "Console") -> None:
+    from ghest_rt.cli.study.running import new_table, show_checks
+    from ghest_rt.studies.numbers import number, percent
 
-    from ghest_rt.cli.study.running import show_end
-
-    shown = Table(
-        title="RMS errors, mean over seeds, ± half its 95 % confidence interval (Tables 5, 6)",
-        title_justify="left",
-        box=box.SIMPLE_HEAD,
-        pad_edge=False,
+    shown = new_table(
+        "RMS errors, mean over seeds, ± half its 95 % confidence interval (Tables 5, 6)",
+        ("sensor: method", "movement"),
+        (*_TITLES.values(), "valid\n%"),
     )
-    for column in ("sensor: method", "movement"):
-        shown.add_column(column, no_wrap=True)
-    for title in _TITLES.values():
-        shown.add_column(title, justify="right", no_wrap=True)
     by_place: dict[tuple[str, str, str], dict[str, dict[str, Any]]] = {}
     for e in document["table"]:
         by_place.setdefault((e["sensor"], e["method"], e["movement"]), {})[e["quantity"]] = e
     reported: dict[str, dict[str, dict[str, Any]]] = {}
     for (sensor, method, movement), of in by_place.items():
-        shown.add_row(f"{sensor}: {method}", movement, *(_cell(of[q], q) for q in _TITLES))
+        valid = percent(of["orientation_deg"]["valid_fraction"])
+        shown.add_row(f"{sensor}: {method}", movement, *(_cell(of[q], q) for q in _TITLES), valid)
         if any(e["paper_rms"] is not None for e in of.values()):
             reported[movement] = of
     if reported:
         shown.add_section()
     for movement, of in reported.items():
-        shown.add_row("as published", movement, *(_number(of[q]["paper_rms"], q) for q in _TITLES))
-    console = Console()
+        shown.add_row("as published", movement, *(number(of[q]["paper_rms"], _scale(q)) for q in _TITLES), "")
     console.print(shown)
-    show_end(console, document, folder)
+    show_checks(document, console)
 
 
 def _cell(entry: dict[str, Any], quantity: str) -> str:
+    from ghest_rt.studies.numbers import number
+
+    text = number(entry["rms"], _scale(quantity))
     if entry["rms_low"] is None:
-        return _number(entry["rms"], quantity)
-    half = (entry["rms_high"] - entry["rms_low"]) / 2
-    return f"{_number(entry['rms'], quantity)}\n±{_number(half, quantity, digits=2)}"
+        return text
+    return f"{text}\n±{number((entry['rms_high'] - entry['rms_low']) / 2, _scale(quantity))}"
 
 
-def _number(value: float | None, quantity: str, digits: int = 3) -> str:
-    if value is None:
-        return "-"
-    return f"{value if quantity.endswith('_deg') else 1e3 * value:.{digits}g}"
+def _scale(quantity: str) -> float:
+    return 1.0 if quantity.endswith("_deg") else 1e3

@@ -5,10 +5,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ghest_rt.cli.options import MOVEMENTS, Method, Movement
+from ghest_rt.cli.options import MOVEMENTS, Method, Movement, Sensor
 from ghest_rt.errors import BadInputError
 
 if TYPE_CHECKING:
+    from ghest_rt.studies.movements import Movements as MovementsPlayed
+    from ghest_rt.studies.observing.scenario import SensorName
     from ghest_rt.vision.station import Method as MethodName
 
 Movements = Annotated[
@@ -34,6 +36,25 @@ Motions = Annotated[
         show_default=False,
     ),
 ]
+Sensors = Annotated[
+    list[Sensor] | None,
+    typer.Option(
+        "--sensor",
+        help="Which sensor; again for more. By default the paper's; `accuracy` without --quick has both",
+        show_default=False,
+    ),
+]
+Seeds = Annotated[
+    int | None,
+    typer.Option(
+        "--seeds",
+        min=1,
+        metavar="N",
+        help="Repeat with so many seeds. By default 1; `accuracy` has 3, for confidence intervals, with --quick 2",
+        show_default=False,
+    ),
+]
+Seed = Annotated[int, typer.Option("--seed", min=0, metavar="N", help="Of the simulation")]
 Out = Annotated[
     Path,
     typer.Option(
@@ -56,7 +77,9 @@ Duration = Annotated[
     float | None,
     typer.Option("--duration", min=0.1, metavar="SECONDS", help="Only the first seconds of every movement", show_default=False),
 ]
-Quick = Annotated[bool, typer.Option("--quick", metavar="", help="A small version of the study, to see that it works")]
+Quick = Annotated[
+    bool, typer.Option("--quick", metavar="", help="A small version of the study, to see that it works; what is named counts")
+]
 
 
 def chosen_methods(methods: list[Method] | None) -> "tuple[MethodName, ...]":
@@ -70,3 +93,28 @@ def chosen_methods(methods: list[Method] | None) -> "tuple[MethodName, ...]":
     if Method.ARUCO in (methods or ()):
         raise BadInputError("--method aruco: needs other markers in the scene; `ghest-rt study compare` has it")
     return tuple(dict.fromkeys(method.value for method in methods)) if methods else METHODS
+
+
+def chosen_sensors(sensors: list[Sensor] | None, default: "tuple[SensorName, ...]" = ("paper",)) -> "tuple[SensorName, ...]":
+    """Return the sensors, each once."""
+    return tuple(dict.fromkeys(sensor.value for sensor in sensors)) if sensors else default
+
+
+def movements_of(
+    movement: list[Movement] | None,
+    motion: list[Path] | None,
+    duration: float | None,
+    small: "MovementsPlayed | None" = None,
+) -> "MovementsPlayed":
+    """Return the movements to be played.
+
+    Args:
+        movement: `--movement`.
+        motion: `--motion`.
+        duration: `--duration`.
+        small: With `--quick`, what is played unless named otherwise.
+    """
+    from ghest_rt.studies.movements import Movements as Played
+
+    named = Played(tuple(m.value for m in movement or ()), tuple(motion or ()), duration)
+    return named if small is None else named.or_else(small)

@@ -1,33 +1,33 @@
-"""What every study does on the command line: check the installation, choose where to run, show progress."""
+"""What every study does on the command line: choose where to run, show progress, print what was found."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from rich import box
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.table import Table
 
+from ghest_rt.cli.console import print_json
 from ghest_rt.studies.engine.cluster import ClusterExecutor
 from ghest_rt.studies.engine.local import LocalExecutor
 from ghest_rt.studies.engine.run import Executor
 from ghest_rt.studies.engine.store import ResultStore
 
 
-def executor(workers: int | None, scheduler: str | None) -> Executor:
-    """Return what carries out the tasks: a Dask cluster if its scheduler is named, otherwise this machine's cores."""
-    return LocalExecutor(workers) if scheduler is None else ClusterExecutor(scheduler)
+def opened(out: Path, workers: int | None, scheduler: str | None) -> tuple[ResultStore, Executor]:
+    """Return where tasks' results are kept, below the results folder and common to all studies in it, and what runs the tasks.
 
-
-def store_in(out: Path) -> ResultStore:
-    """Return where tasks' results are kept, below the results folder and common to all studies in it.
+    That is a Dask cluster if its scheduler is named, otherwise this machine's cores.
 
     Raises:
         BadInputError: The folder cannot be written to.
     """
     store = ResultStore(out / "tasks")
     store.prepare()
-    return store
+    return store, LocalExecutor(workers) if scheduler is None else ClusterExecutor(scheduler)
 
 
 @contextmanager
@@ -56,8 +56,28 @@ def shown_progress(title: str) -> Iterator[Callable[[float, float], None]]:
             raise
 
 
-def show_end(console: Console, document: Mapping[str, Any], folder: Path) -> None:
-    """Print the paper's statements with their verdicts, what the study cost and where its results are."""
+def finish(document: dict[str, Any], out: Path, as_json: bool, show: Callable[[dict[str, Any], Console], None]) -> None:
+    """Print a study's summary as JSON, or as the study shows it with the place of its files."""
+    if as_json:
+        print_json(document)
+        return
+    console = Console()
+    show(document, console)
+    console.print(f"Tables, summary and figures: {out / document['study']}", markup=False)
+
+
+def new_table(title: str, texts: Sequence[str], numbers: Sequence[str]) -> Table:
+    """Return an empty table: columns of texts first, then columns of numbers."""
+    table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
+    for column in texts:
+        table.add_column(column, no_wrap=True)
+    for column in numbers:
+        table.add_column(column, justify="right", no_wrap=True)
+    return table
+
+
+def show_checks(document: Mapping[str, Any], console: Console) -> None:
+    """Print the paper's statements with their verdicts, and what the study cost."""
     for check in document["checks"]:
         verdict = "[green]holds[/]" if check["holds"] else "[yellow]does not hold[/]"
         console.print(f"{verdict}: ", end="")
@@ -65,4 +85,3 @@ def show_end(console: Console, document: Mapping[str, Any], folder: Path) -> Non
         console.print(f"  {check['evidence']}", markup=False, highlight=False, style="dim")
         console.print(f"  {check['explanation']}", markup=False, highlight=False, style="dim")
     console.print(f"Processor time, interrupted runs included: {document['cpu_s'] / 60:.1f} min")
-    console.print(f"Tables, summary and figures: {folder}", markup=False)

@@ -2,18 +2,21 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, cast
+from typing import Any, cast
 
 from ghest_rt.studies.engine.run import Executor, Progress, run_tasks, spent_cpu_s
 from ghest_rt.studies.engine.store import ResultStore
 from ghest_rt.studies.movements import METHODS, Movements, frames_of
-from ghest_rt.studies.observing.scenario import Scenario
+from ghest_rt.studies.observing.scenario import Scenario, SensorName
 from ghest_rt.studies.session.errors import QUANTITIES, STATISTICS
 from ghest_rt.studies.session.tasks import judge_task
 from ghest_rt.vision.station import Method
 
 Row = dict[str, object]
-SensorName = Literal["paper", "sr300"]
+
+
+QUICK = Movements(duration_s=2.0)
+"""Enough to see that everything runs."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,14 +1,15 @@
 """Tables 5 and 6 from an accuracy study's rows: means over seeds with confidence intervals, the paper's values beside."""
 
 from collections.abc import Sequence
-from typing import cast
+from dataclasses import asdict
+from typing import Any, cast
 
 import numpy as np
 
 from ghest_rt.geometry.so3 import Array
-from ghest_rt.studies.accuracy.study import Row, select
+from ghest_rt.studies.accuracy.study import AccuracyPlan, Row, select
 from ghest_rt.studies.checks import Check
-from ghest_rt.studies.engine.tables import finite
+from ghest_rt.studies.numbers import finite
 from ghest_rt.studies.paper_values import ACCURACY, MEAN, MOVEMENTS
 from ghest_rt.studies.session.errors import QUANTITIES
 
@@ -16,29 +17,38 @@ MEAN_OF_MOVEMENTS = "mean"
 _CONFIDENCE = 0.95
 
 
+def summarise(plan: AccuracyPlan, rows: Sequence[Row], cpu_s: float) -> dict[str, Any]:
+    """Return the summary of a study's rows as JSON takes it; `cpu_s` is the processor time that they took."""
+    entries = table(rows)
+    return {
+        "study": "accuracy",
+        "seeds": list(plan.seeds),
+        "duration_s": plan.movements.duration_s,
+        "cpu_s": cpu_s,
+        "table": entries,
+        "checks": [asdict(check) for check in checks(entries)],
+    }
+
+
 def table(rows: Sequence[Row]) -> list[Row]:
     """Return one entry per sensor, method, quantity and movement, and one for the mean of the movements.
 
     Each has `rms` (the mean over seeds), `rms_low` and `rms_high` (95 % confidence interval of that mean by Student's t over
-    the seeds; None for one seed), `sd` (mean over seeds), `seeds`, and the paper's `paper_rms` and `paper_sd` (None for
-    movements that are not the paper's, and for sensors that are not).
+    the seeds; None for one seed), `sd` and `valid_fraction` (means over seeds), `seeds`, and the paper's `paper_rms` and
+    `paper_sd` (None for movements that are not the paper's, and for sensors that are not).
     """
     entries: list[Row] = []
     movements = list(dict.fromkeys(cast(str, row["movement"]) for row in rows))
     for sensor in dict.fromkeys(row["sensor"] for row in rows):
         for method in dict.fromkeys(row["method"] for row in rows):
             for quantity in QUANTITIES:
-                rms = [
-                    _by_seed(select(rows, sensor=sensor, method=method, quantity=quantity, movement=m), "rms")
-                    for m in movements
-                ]
-                sd = [
-                    _by_seed(select(rows, sensor=sensor, method=method, quantity=quantity, movement=m), "sd") for m in movements
-                ]
-                whole = [*zip(movements, rms, sd, strict=True)]
+                chosen = [select(rows, sensor=sensor, method=method, quantity=quantity, movement=m) for m in movements]
+                rms, sd, valid = ([_by_seed(of, column) for of in chosen] for column in ("rms", "sd", "valid_fraction"))
+                whole = [*zip(movements, rms, sd, valid, strict=True)]
                 if len(movements) > 1:
-                    whole.append((MEAN_OF_MOVEMENTS, np.mean(rms, axis=0), np.mean(sd, axis=0)))
-                for movement, several, deviations in whole:
+                    means = (np.mean(column, axis=0) for column in (rms, sd, valid))
+                    whole.append((MEAN_OF_MOVEMENTS, *means))
+                for movement, several, deviations, fractions in whole:
                     low, high = confidence_interval(several)
                     reported = ACCURACY[quantity].get(movement) if sensor == "paper" else None
                     paper_mean = MEAN[quantity] if sensor == "paper" and tuple(movements) == MOVEMENTS else None
@@ -52,6 +62,7 @@ def table(rows: Sequence[Row]) -> list[Row]:
                             "rms_low": low,
                             "rms_high": high,
                             "sd": finite(deviations.mean()),
+                            "valid_fraction": finite(fractions.mean()),
                             "seeds": len(several),
                             "paper_rms": reported.rms if reported else paper_mean if movement == MEAN_OF_MOVEMENTS else None,
                             "paper_sd": reported.sd if reported else None,

@@ -38,7 +38,7 @@ _JUDGING_LIBRARIES = (*_SEEING_LIBRARIES, "imufusion", "SALib")
 def code_salt(kind: str) -> str:
     """Return the hash of the code behind tasks of a kind, of the shipped station files, and of the libraries' versions.
 
-    The kind's code is its module and those beside it in a package of a study; of `ghest_rt.studies` itself only the module.
+    The kind's code is its module and those beside it.
     What is observed does not depend on the estimators: it is kept when only they change.
     """
     module_name = kind.partition(":")[0]
@@ -48,9 +48,7 @@ def code_salt(kind: str) -> str:
     )
     spec = importlib.util.find_spec(module_name)
     if spec is not None and spec.origin is not None:
-        module = Path(spec.origin)
-        beside = [module] if module.parent == Path(__file__).parents[1] else sorted(module.parent.glob("*.py"))
-        for file in beside:
+        for file in sorted(Path(spec.origin).parent.glob("*.py")):
             digest.update(file.read_bytes())
     return digest.hexdigest()
 

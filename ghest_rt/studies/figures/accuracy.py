@@ -1,9 +1,10 @@
 """Figure 13: box plots of the errors of markers and arm."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, cast
 
-from ghest_rt.studies.figures.style import METHOD_COLORS, new_figure
+from ghest_rt.studies.figures.style import METHOD_COLORS, Drawn, new_figure
+from ghest_rt.studies.numbers import span_in_words
 from ghest_rt.studies.paper_values import ACCURACY
 
 _PANELS = (
@@ -16,6 +17,13 @@ _LEGEND_COLUMNS = 4
 """More would not fit the width."""
 
 _BOX = ("whislo", "q1", "med", "q3", "whishi")
+
+
+def figures(rows: Sequence[dict[str, object]], duration_s: float | None) -> Iterator[Drawn]:
+    """Draw Figure 13 for every sensor; `duration_s` is how much of each movement was judged, None for all."""
+    for sensor in dict.fromkeys(cast(str, row["sensor"]) for row in rows):
+        caption = f"Figure 13: errors of markers and arm, sensor {sensor}, {span_in_words(duration_s)}"
+        yield Drawn(f"figure13_{sensor}", caption, draw_figure_13(rows, sensor))
 
 
 def draw_figure_13(rows: Sequence[dict[str, object]], sensor: str) -> Any:

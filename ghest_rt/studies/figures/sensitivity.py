@@ -1,10 +1,10 @@
 """Figures 14 to 17: errors and relative sensitivities as markers shift; and what goes beyond them."""
 
-from collections.abc import Sequence
-from pathlib import Path
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, cast
 
-from ghest_rt.studies.figures.style import METHOD_COLORS, PARAMETER_STYLES, new_figure, save_figure
+from ghest_rt.studies.figures.style import METHOD_COLORS, PARAMETER_STYLES, Drawn, new_figure
+from ghest_rt.studies.numbers import span_in_words
 from ghest_rt.studies.paper_values import MEAN_RMSE_20_MM_DEG, PARAMETERS
 
 Row = dict[str, object]
@@ -22,25 +22,31 @@ _PANELS = (
 )
 
 
-def save_all(rows: Sequence[Row], indices: Sequence[Row], folder: Path) -> list[Path]:
-    """Write every figure of an analysis; return the paths.
+def figures(summary: Mapping[str, Any]) -> Iterator[Drawn]:
+    """Draw every figure of an analysis.
 
     Args:
-        rows: Rows of the analysis.
-        indices: Its Sobol indices; may be empty.
-        folder: Where they go.
+        summary: Its summary.
     """
+    rows, indices, sensor = summary["rows"], summary["sobol"]["indices"], summary["sensor"]
     movements, methods = (list(dict.fromkeys(cast(str, r[column]) for r in rows)) for column in ("movement", "method"))
-    paths = save_figure(draw_drift_by_method(rows), folder, "drift_by_method")
+    of_what = f"sensor {sensor}, {span_in_words(summary['duration_s'])}"
+    caption = f"Errors against the translation of a marker, method by method: {of_what}"
+    yield Drawn("drift_by_method", caption, draw_drift_by_method(rows, of_what))
+    if any(r["group"] != "shift" for r in rows):
+        yield Drawn("further", f"What the paper leaves out, at the largest amount: {of_what}", draw_further(rows))
     for movement in movements:
         number = FIGURES.get(movement, "")
         for method in methods:
-            paths += save_figure(draw_figure_14(rows, movement, method), folder, f"figure{number}_{movement}_{method}")
-    if any(r["group"] != "shift" for r in rows):
-        paths += save_figure(draw_further(rows), folder, "further")
+            caption = f"Figure {number}".strip() + f": {movement}, method {method}, {of_what}"
+            picture = draw_figure_14(rows, movement, method)
+            yield Drawn(f"figure{number}_{movement}_{method}", caption, picture, folded=method != "paper")
     for movement in dict.fromkeys(cast(str, r["movement"]) for r in indices):
-        paths += save_figure(draw_sobol(indices, movement), folder, f"sobol_{movement}")
-    return paths
+        caption = (
+            f"Sobol indices on a surrogate of the chain, {movement}: N = {summary['sobol']['samples']} base samples, "
+            f"{of_what}; bars end to end are 95 % confidence intervals"
+        )
+        yield Drawn(f"sobol_{movement}", caption, draw_sobol(indices, movement), folded=movement != "COMB")
 
 
 def draw_figure_14(rows: Sequence[Row], movement: str, method: str) -> Any:
@@ -69,8 +75,7 @@ def draw_figure_14(rows: Sequence[Row], movement: str, method: str) -> Any:
             )
         if column.startswith("S_"):
             axes.axhline(1.0, color="0.4", linewidth=0.8, linestyle=":")
-            _keep_within(axes, _S_LIMITS)
-        axes.set_title(title)
+        axes.set_title(title + (_keep_within(axes, _S_LIMITS) if column.startswith("S_") else ""))
         axes.set_xlabel("translation of the marker (mm)")
         axes.set_ylabel(label)
     handles, labels = axes.get_legend_handles_labels()
@@ -79,18 +84,21 @@ def draw_figure_14(rows: Sequence[Row], movement: str, method: str) -> Any:
     return figure
 
 
-def _keep_within(axes: Any, limits: tuple[float, float]) -> None:
-    """Cut the axis where single values would flatten all others, and say so."""
+def _keep_within(axes: Any, limits: tuple[float, float]) -> str:
+    """Cut the axis where single values would flatten all others; return what the title is to say of it."""
     low, high = axes.get_ylim()
     axes.set_ylim(max(low, limits[0]), min(high, limits[1]))
-    if low < limits[0] or high > limits[1]:
-        axes.text(0.98, 0.03, "some points lie beyond the axis", transform=axes.transAxes, ha="right", fontsize=7)
+    return "\n(some points lie beyond the axis)" if low < limits[0] or high > limits[1] else ""
 
 
-def draw_drift_by_method(rows: Sequence[Row]) -> Any:
+def draw_drift_by_method(rows: Sequence[Row], of_what: str) -> Any:
     """Return the arm's orientation and position error against marker translation, method by method.
 
     The line is the mean over movements and q1 to q6, the band reaches from the least to the greatest of them.
+
+    Args:
+        rows: Rows of a sensitivity analysis.
+        of_what: Sensor and duration, in words.
     """
     shifts = [r for r in rows if r["group"] == "shift"]
     methods = list(dict.fromkeys(cast(str, r["method"]) for r in shifts))
@@ -121,6 +129,8 @@ def draw_drift_by_method(rows: Sequence[Row]) -> Any:
     )
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=len(labels), frameon=False)
+    movements = ", ".join(dict.fromkeys(cast(str, r["movement"]) for r in shifts))
+    figure.suptitle(f"{movements}: {of_what}", fontsize=9)
     return figure
 
 
@@ -191,8 +201,8 @@ def draw_sobol(rows: Sequence[Row], movement: str) -> Any:
             )
         axes.set_yticks(places, [cast(str, r["parameter"]).replace("_", " ") for r in of_output])
         axes.set_title(f"{title}, {movement}")
+        axes.axvline(0.0, color="0.3", linewidth=0.8)
         axes.set_xlabel("share of the variance (dimensionless)")
-        axes.set_xlim(left=0.0)
         axes.grid(axis="y", visible=False)
     panels[0].invert_yaxis()
     handles, labels = panels[0].get_legend_handles_labels()

@@ -1,6 +1,7 @@
 """How figures look, and how they are written: colours safe for colour-blind readers, units on every axis."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -45,6 +46,23 @@ _STYLE: Any = {
     "figure.dpi": 110,
     "savefig.dpi": 200,
 }
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Drawn:
+    """A figure of a study.
+
+    Attributes:
+        name: Of its files, without an ending.
+        caption: What it shows.
+        picture: The Matplotlib figure.
+        folded: Whether the report shows it only on request.
+    """
+
+    name: str
+    caption: str
+    picture: Any
+    folded: bool = False
 
 
 def new_figure(width_in: float, height_in: float) -> Any:

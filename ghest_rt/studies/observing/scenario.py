@@ -16,6 +16,10 @@ from ghest_rt.simulation.world import World
 from ghest_rt.vision.station import Method
 
 Vector3 = tuple[float, float, float]
+SensorName = Literal["paper", "sr300"]
+
+HEIGHT_M = 1.75
+"""The patient's, in every study."""
 
 
 class MotionFile(Strict):
@@ -40,7 +44,7 @@ class Scenario(Strict):
 
     movement: str | None = Field(default=None, description="A movement of Table 2")
     motion: MotionFile | None = Field(default=None, description="A recorded movement instead")
-    sensor: Literal["paper", "sr300"] = "paper"
+    sensor: SensorName = "paper"
     seed: int = 1
     duration_s: float | None = None
     shifts: tuple[str, ...] = Field(default=(), description="Marker shifts as on the command line, m1:x:0.02")
@@ -88,6 +92,7 @@ class Scenario(Strict):
                 motion=None if self.motion is None else Path(self.motion.path),
                 sensor=self.sensor,
                 seed=self.seed,
+                height_m=HEIGHT_M,
                 duration_s=self.duration_s,
                 marker_moves=(*map(parse_shift, self.shifts), *map(parse_turn, self.turns)),
                 soft_tissue=self.soft_tissue,

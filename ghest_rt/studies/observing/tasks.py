@@ -7,7 +7,9 @@ from ghest_rt.studies.observing.observed import observe
 from ghest_rt.studies.observing.packing import pack
 from ghest_rt.studies.observing.scenario import Scenario
 
-_FRAME_COST = {"paper": 1.0, "sr300": 16.0}
+FRAME_COST = {"paper": 1.0, "sr300": 16.0}
+"""How long a frame takes by sensor, in the unit of all costs."""
+
 _SETUP_COST = 30.0
 
 
@@ -23,7 +25,7 @@ def observe_task(scenario: Scenario, frames: int, *, moved_only: bool = False) -
     return Task.of(
         f"{__name__}:observe_session",
         {"scenario": scenario.as_seen().model_dump(mode="json"), "moved_only": moved_only},
-        cost=_SETUP_COST + cameras * frames * _FRAME_COST[scenario.sensor],
+        cost=_SETUP_COST + cameras * frames * FRAME_COST[scenario.sensor],
     )
 
 

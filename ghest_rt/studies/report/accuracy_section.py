@@ -3,7 +3,8 @@
 from pathlib import Path
 from typing import Any
 
-from ghest_rt.studies.report.page import Cell, Figure, Section, Statement, Table, figure_of, number
+from ghest_rt.studies.numbers import number, percent, span_in_words
+from ghest_rt.studies.report.page import Cell, Section, Statement, Table, figures_of
 
 Row = dict[str, Any]
 
@@ -29,12 +30,14 @@ def accuracy_section(summary: Row, folder: Path) -> Section:
         title="Accuracy",
         paragraphs=(
             "Errors of the estimated against the true pose, by the paper's metrics (3.4.2): distance for positions, norm "
-            "of the exponential map of the rotation between them for orientations. Root mean square over each movement, "
+            "of the exponential map of the rotation between them for orientations. Root mean square over each movement "
+            f"({span_in_words(summary['duration_s'])}), "
             f"mean over {len(summary['seeds'])} seeds; ± is half the 95 % confidence interval of that mean. In italics "
-            "what the paper reports.",
+            "what the paper reports. Valid is the share of the samples with that status; errors are of all samples that have "
+            "angles, degraded ones too.",
         ),
         tables=tuple(tables),
-        figures=_figures(folder),
+        figures=figures_of(summary, folder),
         statements_title="The paper's statements on accuracy",
         statements=statements_of(summary),
     )
@@ -51,19 +54,21 @@ def _table(entries: list[Row], sensor: str, title: str, quantities: tuple[tuple[
     published = any(entry["paper_rms"] is not None for entry in here)
     rows: list[tuple[Cell, ...]] = []
     for movement in dict.fromkeys(entry["movement"] for entry in here):
-        cells = [Cell("mean" if movement == "mean" else movement, "")]
+        cells = [Cell(movement, "")]
         for quantity, _, scale in quantities:
             found = {e["method"]: e for e in here if (e["movement"], e["quantity"]) == (movement, quantity)}
             if published:
                 cells.append(Cell(number(next(iter(found.values()))["paper_rms"], scale), "published"))
             cells += [Cell(_with_interval(found[m], scale), "ours" if m == "fused" else "number") for m in methods]
         rows.append(tuple(cells))
+        valid = {e["method"]: e["valid_fraction"] for e in here if e["movement"] == movement}
+        rows[-1] += tuple(Cell(percent(valid[m])) for m in methods)
     columns = (("as published",) if published else ()) + tuple(methods)
     return Table(
         title=f"{title}, sensor {sensor}",
-        head=("movement", *columns * len(quantities)),
+        head=("movement", *columns * len(quantities), *methods),
         rows=tuple(rows),
-        groups=(("", 1), *((name, len(columns)) for _, name, _ in quantities)),
+        groups=(("", 1), *((name, len(columns)) for _, name, _ in quantities), ("valid (%)", len(methods))),
     )
 
 
@@ -72,10 +77,3 @@ def _with_interval(entry: Row, scale: float) -> str:
     if entry["rms_low"] is None:
         return text
     return f"{text} ± {number((entry['rms_high'] - entry['rms_low']) / 2, scale)}"
-
-
-def _figures(folder: Path) -> tuple[Figure, ...]:
-    return tuple(
-        figure_of(path, f"Figure 13: errors of markers and arm, sensor {path.stem.removeprefix('figure13_')}")
-        for path in sorted((folder / "figures").glob("figure13_*.png"))
-    )

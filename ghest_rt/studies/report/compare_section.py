@@ -3,7 +3,9 @@
 from pathlib import Path
 from typing import Any
 
-from ghest_rt.studies.report.page import Cell, Section, Statement, Table, figure_of, number
+from ghest_rt.studies.compare.verdicts import tally
+from ghest_rt.studies.numbers import number, percent, span_in_words
+from ghest_rt.studies.report.page import Cell, Section, Statement, Table, figures_of
 
 Row = dict[str, Any]
 
@@ -28,14 +30,6 @@ def compare_section(summary: Row, folder: Path) -> Section:
     groups = [(group["sensor"], group["kind"]) for group in contenders[0]["measured"]]
     tables = [_table(summary, sensor, kind) for sensor, kind in groups]
     tables += [_by_movement(summary, sensor) for sensor in summary["settings"]["sensors"]]
-    figures = [
-        figure_of(path, caption + f", sensor {path.stem.partition('_')[2]}")
-        for pattern, caption in (
-            ("contenders_*.png", "Errors of the GH rotation; a symbol per movement"),
-            ("angles_*.png", "Errors angle by angle"),
-        )
-        for path in sorted((folder / "figures").glob(pattern))
-    ]
     return Section(
         key="compare",
         title="Comparison with other ways (Table 7)",
@@ -44,10 +38,12 @@ def compare_section(summary: Row, folder: Path) -> Section:
             "the neutral posture and told the patient's dimensions exactly (the inertial sensors: their true attitudes at"
             " the start); nobody sees the truth after that. Errors are root mean squares over a movement, then means over"
             " movements and seeds; degrees. “When published” is judged by where the arm is at the instant at which the "
-            "answer is published, all other columns at the instant for which it is meant.",
+            "answer is published, all other columns at the instant for which it is meant. Errors are of the instants at which "
+            "a contender answers; whether fused wins is judged where both do, and an answer less often is no win. "
+            f"Played: {span_in_words(summary['settings']['duration_s'])}.",
         ),
         tables=tuple(tables),
-        figures=tuple(figures),
+        figures=figures_of(summary, folder),
         statements_title="Does fused win?",
         statements=_statements(summary),
         badges=("always", "not always"),
@@ -59,7 +55,8 @@ def _note(who: Row, summary: Row) -> str:
     text = f"After {who['source']}. Its own publication: {who['published']}. To bear in mind: {who['caveat']}."
     if who["key"] == "inertial":
         rest = summary["inertial_after_rest"]
-        text += f" Measured here: after holding still for {rest['rest_s']:.0f} s it is off by {number(rest['error_deg'])}°."
+        text += f" Measured here: after holding still for {rest['rest_s']:.0f} s it is off by {number(rest['error_deg'])}° "
+        text += f"(mean of {rest['sessions']} sessions, {number(rest['least_deg'])}° to {number(rest['most_deg'])}°)."
     return text
 
 
@@ -68,14 +65,14 @@ def _table(summary: Row, sensor: str, kind: str) -> Table:
     for who in summary["contenders"]:
         measured = next(g for g in who["measured"] if (g["sensor"], g["kind"]) == (sensor, kind))
         style = "ours" if who["key"] == "fused" else "number"
-        verdicts = [v for v in summary["verdicts"] if (v["contender"], v["sensor"]) == (who["key"], sensor)]
-        verdicts = [v for v in verdicts if v["movement"] in _movements(summary, sensor, kind)]
+        won = tally(summary["verdicts"], who["key"], sensor, kind)
         rows.append(
             (
                 Cell(who["title"], ""),
                 *(Cell(number(measured[name]), style) for name, _ in _COLUMNS),
-                Cell(f"{sum(v['fused_wins'] for v in verdicts)} of {len(verdicts)}" if verdicts else ""),
-                Cell(f"{sum(v['fused_wins_when_published'] for v in verdicts)} of {len(verdicts)}" if verdicts else ""),
+                Cell(percent(measured["answered_fraction"])),
+                Cell(f"{won.own_instant} of {won.rows}" if won.rows else ""),
+                Cell(f"{won.published} of {won.rows}" if won.rows else ""),
                 Cell(who["published_short"], "published wide"),
             )
         )
@@ -85,7 +82,14 @@ def _table(summary: Row, sensor: str, kind: str) -> Table:
     )
     return Table(
         title=f"Mean over {_KINDS[kind]}, sensor {sensor}: errors (°)",
-        head=("contender", *(title for _, title in _COLUMNS), "fused wins", "… when published", "its own publication"),
+        head=(
+            "contender",
+            *(title for _, title in _COLUMNS),
+            "answered (%)",
+            "fused wins",
+            "… when published",
+            "its own publication",
+        ),
         rows=tuple(rows),
         note=(
             f"The scapula turned by (RMS against the neutral posture, unseen by any encoder): {turned}. How much there is to "
@@ -94,7 +98,7 @@ def _table(summary: Row, sensor: str, kind: str) -> Table:
     )
 
 
-def _movements(summary: Row, sensor: str, kind: str, column: str = "girdle_turn_deg") -> dict[str, float]:
+def _movements(summary: Row, sensor: str, kind: str, column: str) -> dict[str, float]:
     """Return the movements of a kind and what a column says of each."""
     return {r["movement"]: r[column] for r in summary["rows"] if (r["sensor"], r["kind"]) == (sensor, kind)}
 

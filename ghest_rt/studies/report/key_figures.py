@@ -3,8 +3,9 @@
 from collections.abc import Mapping
 from typing import Any
 
+from ghest_rt.studies.numbers import number
 from ghest_rt.studies.paper_values import MEAN, MEAN_RMSE_20_MM_DEG
-from ghest_rt.studies.report.page import KeyFigure, number
+from ghest_rt.studies.report.page import KeyFigure
 
 Row = dict[str, Any]
 

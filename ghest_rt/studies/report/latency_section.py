@@ -3,7 +3,8 @@
 from pathlib import Path
 from typing import Any
 
-from ghest_rt.studies.report.page import Cell, Section, Table, figure_of, number
+from ghest_rt.studies.numbers import number
+from ghest_rt.studies.report.page import Cell, Section, Table, figures_of
 
 Row = dict[str, Any]
 
@@ -15,17 +16,17 @@ def latency_section(summary: Row, folder: Path) -> Section:
         summary: Summary of `study latency`.
         folder: The study's folder.
     """
-    path = folder / "figures" / "latency.png"
     return Section(
         key="latency",
         title="Latency and prediction",
         paragraphs=(
-            "Movements played slower and faster, every answer judged by where the arm is at the instant at which it is "
-            "published. A method that waits for its inputs is behind by its lag; fused forecasts to the instant of "
-            "publishing. “Behind the arm” is the slope of error against angular speed.",
+            f"Movements played slower and faster ({summary['settings']['span_s']:g} s of each, in its own time), every answer "
+            "judged by where the arm is at the instant at which it is published. A method that waits for its inputs is behind "
+            "by its lag; fused forecasts to the instant of publishing. “Behind the arm” is the slope of error against angular "
+            "speed.",
         ),
         tables=(_candidates(summary), _speeds(summary)),
-        figures=(figure_of(path, "Error when published against the speed of the GH joint"),) if path.is_file() else (),
+        figures=figures_of(summary, folder),
     )
 
 

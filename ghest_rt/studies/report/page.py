@@ -1,12 +1,13 @@
 """What the report's page consists of, before it becomes HTML."""
 
 import base64
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from ghest_rt.errors import BadInputError
-
-_SMALL = 0.01
+from ghest_rt.studies.results import FIGURES
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,26 +119,23 @@ class Section:
     missing: bool = False
 
 
-def figure_of(path: Path, caption: str, *, folded: bool = False) -> Figure:
-    """Return a PNG file as a figure.
+def figures_of(summary: Mapping[str, Any], folder: Path) -> tuple[Figure, ...]:
+    """Return the figures that a study's summary lists, and no others that may lie in its folder.
+
+    Args:
+        summary: The summary.
+        folder: The study's folder.
 
     Raises:
-        BadInputError: The file cannot be read.
+        BadInputError: One of them cannot be read.
     """
+    return tuple(
+        Figure(of["caption"], _data_uri(folder / FIGURES / f"{of['name']}.png"), of["folded"]) for of in summary["figures"]
+    )
+
+
+def _data_uri(path: Path) -> str:
     try:
-        data = base64.b64encode(path.read_bytes()).decode("ascii")
+        return "data:image/png;base64," + base64.b64encode(path.read_bytes()).decode("ascii")
     except OSError as error:
         raise BadInputError(f"{path}: cannot be read: {error.strerror or error}; run the study again") from error
-    return Figure(caption, f"data:image/png;base64,{data}", folded)
-
-
-def number(value: float | None, scale: float = 1.0) -> str:
-    """Return a number with three digits, fewer below a tenth, or a dash."""
-    if value is None:
-        return "–"
-    scaled = scale * value
-    if abs(scaled) >= 99.95:
-        return f"{scaled:.0f}"
-    if abs(scaled) >= 0.1:
-        return f"{scaled:#.3g}"
-    return f"{scaled:.3f}" if abs(scaled) >= _SMALL else f"{scaled:.4f}"

@@ -3,8 +3,9 @@
 from pathlib import Path
 from typing import Any
 
+from ghest_rt.studies.numbers import number, span_in_words
 from ghest_rt.studies.report.accuracy_section import statements_of
-from ghest_rt.studies.report.page import Cell, Figure, Section, Table, figure_of, number
+from ghest_rt.studies.report.page import Cell, Section, Table, figures_of
 
 Row = dict[str, Any]
 
@@ -30,11 +31,13 @@ def sensitivity_section(summary: Row, folder: Path) -> Section:
         title="Sensitivity to markers that move and to wrong calibration",
         paragraphs=(
             "Each marker is really moved in the scene and rendered again, parameter by parameter (Table 3: q1 to q3 move "
-            "m0, q4 to q6 move m1), while the calibration stays as it was. Relative sensitivity S is equation (11): the "
+            "m0, q4 to q6 move m1), while the calibration stays as it was "
+            f"(sensor {summary['sensor']}, {span_in_words(summary['duration_s'])}). "
+            "Relative sensitivity S is equation (11): the "
             "share by which the error grows for a share by which the parameter grows.",
         ),
         tables=tuple(tables),
-        figures=_figures(folder),
+        figures=figures_of(summary, folder),
         statements_title="The paper's statements on sensitivity",
         statements=statements_of(summary),
     )
@@ -114,21 +117,3 @@ def _kind(of: dict[str, Row], method: str, column: str) -> str:
         return "number"
     known = [row[column] for row in of.values() if row[column] is not None]
     return "ours" if of[method][column] is None or of[method][column] <= _MUCH * min(known) else "behind"
-
-
-def _figures(folder: Path) -> tuple[Figure, ...]:
-    figures: list[Figure] = []
-    for path in sorted((folder / "figures").glob("*.png"), key=lambda p: (not p.stem.startswith("drift"), p.stem)):
-        words = path.stem.split("_")
-        if path.stem == "drift_by_method":
-            figures.append(figure_of(path, "Errors against the translation of a marker, method by method"))
-        elif path.stem == "further":
-            figures.append(figure_of(path, "What the paper leaves out, at the largest amount"))
-        elif words[0] == "sobol":
-            caption = f"Sobol indices on a surrogate of the chain, {' '.join(words[1:])}"
-            figures.append(figure_of(path, caption, folded=words[-1] != "COMB"))
-        elif words[0].startswith("figure"):
-            name = words[0].replace("figure", "Figure ").strip()
-            caption = f"{name}: {' '.join(words[1:-1])}, method {words[-1]}"
-            figures.append(figure_of(path, caption, folded=words[-1] != "paper"))
-    return tuple(figures)

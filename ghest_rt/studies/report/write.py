@@ -12,8 +12,8 @@ from ghest_rt.studies.report.compare_section import compare_section
 from ghest_rt.studies.report.key_figures import key_figures
 from ghest_rt.studies.report.latency_section import latency_section
 from ghest_rt.studies.report.page import Section
-from ghest_rt.studies.report.results import read_summary
 from ghest_rt.studies.report.sensitivity_section import sensitivity_section
+from ghest_rt.studies.results import read_summary
 
 Builder = Callable[[dict[str, Any], Path], Section]
 

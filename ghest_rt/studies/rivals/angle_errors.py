@@ -17,6 +17,10 @@ QUANTITIES = ("orientation_deg", "published_deg", *ANGLES, "plane_deg")
 the plane of shoulder, elbow and wrist (what the swivel angle tells)."""
 
 
+truth_track = TruthTrack.of
+"""By the name that the benchmarks know."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Answers:
     """What a method said at the instants of the grid.
@@ -35,14 +39,6 @@ class Answers:
     def of(cls, estimates: Sequence[GhEstimate], lag_ns: int) -> "Answers":
         """Return the answers in estimates."""
         return cls([e.t_sample_ns for e in estimates], [e.gh_from_arm for e in estimates], lag_ns)
-
-
-def truth_track(samples: Sequence[TruthSample]) -> TruthTrack:
-    """Return the truth at any instant from samples in the order of time."""
-    track = TruthTrack()
-    for sample in samples:
-        track.add(sample)
-    return track
 
 
 def error_columns(answers: Answers, truth: TruthTrack) -> dict[str, Array]:
@@ -71,6 +67,28 @@ def error_statistics(answers: Answers, truth: TruthTrack) -> dict[str, float | i
         "answered_fraction": answered / max(1, int(known.sum())),
         "angles_judged_fraction": int(np.isfinite(columns["flexion_deg"]).sum()) / max(1, answered),
     }
+
+
+def on_common_instants(theirs: Answers, fused: Answers, truth: TruthTrack) -> dict[str, float]:
+    """Return what two contenders are off by where both have an answer, so that silence in hard moments wins nothing.
+
+    Returns:
+        `common_fraction`, the share of the instants with truth at which both answered; for each of `QUANTITIES` its root mean
+        square there as `common_<quantity>` for the one and `fused_common_<quantity>` for the other.
+    """
+    known = {t_ns for t_ns in theirs.t_ns if truth.at(t_ns) is not None}
+    columns = error_columns(theirs, truth), error_columns(fused, truth)
+    at = {t_ns: k for k, t_ns in enumerate(fused.t_ns)}
+    shared = [(k, at[t_ns]) for k, t_ns in enumerate(theirs.t_ns) if t_ns in at]
+    mine, others = ([pair[side] for pair in shared] for side in (0, 1))
+    found: dict[str, float] = {}
+    for name in QUANTITIES:
+        one, other = columns[0][name][mine], columns[1][name][others]
+        both = np.isfinite(one) & np.isfinite(other)
+        found[f"common_{name}"], found[f"fused_common_{name}"] = _rms(one[both]), _rms(other[both])
+        if name == "orientation_deg":
+            found["common_fraction"] = int(both.sum()) / max(1, len(known))
+    return found
 
 
 def girdle_turn_deg(truth: Sequence[TruthSample]) -> float:

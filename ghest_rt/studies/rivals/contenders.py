@@ -13,7 +13,7 @@ class Contender:
         source: The publication it follows.
         published: What that publication reports.
         published_short: The same in a few words, degrees.
-        published_deg: The figure to set beside ours, degrees; None where no single one fits.
+        published_deg: The figure of the GH rotation to set beside ours, degrees; None where none is published of it.
         lag_ms: How long after an instant its answer is published; None where the station file says.
         caveat: What makes the two figures incomparable, or favours one side.
         strength: What it rests on where it does better than `fused`.
@@ -125,8 +125,8 @@ CONTENDERS = {
             title="inertial sensors (imufusion)",
             source="Madgwick's filter (imufusion), gyroscopes and accelerometers, without magnetometers near motors",
             published="OpenSenseRT (2021): 5.6 deg, eight upper-limb angles at 30 Hz; 3 deg RMS dynamic (the paper's [5])",
-            published_short="5.6",
-            published_deg=5.6,
+            published_short="5.6 (eight angles)",
+            published_deg=None,
             lag_ms=15.0,
             caveat=(
                 "favoured here: true attitudes at the start, sensors screwed to the bones, at most half a minute; its heading "

@@ -103,7 +103,8 @@ class InertialEstimator:
     """A `GhEstimator` from two inertial sensors, without magnetometers: motors and steel of an exoskeleton disturb these.
 
     Both attitudes are given at the start, and so is how each sensor sits on its bone; from then on the filter is on its own.
-    Rejections are the library's recommended ones, and so is the gain unless told otherwise.
+    Rejections and the correction of the gyroscopes' offset are the library's recommended ones, and so is the gain unless told
+    otherwise.
     """
 
     def __init__(
@@ -113,6 +114,8 @@ class InertialEstimator:
         gh_from_scapula_sensor: Array,
         arm_from_arm_sensor: Array,
         gain: float = RECOMMENDED_GAIN,
+        *,
+        correct_offset: bool = True,
     ) -> None:
         """Set the filters on the initial attitudes.
 
@@ -122,11 +125,12 @@ class InertialEstimator:
             gh_from_scapula_sensor: (3, 3) that sensor's rotation in the GH frame.
             arm_from_arm_sensor: (3, 3) the other's in the arm frame.
             gain: How strongly the accelerometers correct the gyroscopes; 0 leaves them alone.
+            correct_offset: Whether the library's own algorithm learns the gyroscopes' offset while a sensor seems to be still.
 
         Raises:
             GhestError: imufusion is not installed.
         """
-        self._filters = (_Attitude(scapula, gain), _Attitude(arm, gain))
+        self._filters = (_Attitude(scapula, gain, correct_offset), _Attitude(arm, gain, correct_offset))
         self._gh_from_scapula = gh_from_scapula_sensor
         self._arm_from_sensor = arm_from_arm_sensor
 
@@ -152,7 +156,7 @@ class InertialEstimator:
 class _Attitude:
     """One sensor's filter, stepped up to the instants asked for."""
 
-    def __init__(self, track: ImuTrack, gain: float) -> None:
+    def __init__(self, track: ImuTrack, gain: float, correct_offset: bool) -> None:
         need_extra("study", "the inertial rival")
         import imufusion  # noqa: PLC0415 - an extra, imported only when used
 
@@ -167,6 +171,8 @@ class _Attitude:
         settings.acceleration_rejection = 10.0
         settings.rejection_timeout = 5 * rate_hz
         self._ahrs.set_settings(settings)
+        # As the library says: "should be used in conjunction with the AHRS algorithm to achieve best performance".
+        self._offset = imufusion.Bias().set_settings(imufusion.BiasSettings(sample_rate=rate_hz)) if correct_offset else None
         self._ahrs.skip_startup()
         self._ahrs.set_quaternion(quat_wxyz_from_matrix(track.earth_from_sensor))
 
@@ -174,7 +180,10 @@ class _Attitude:
         """Return earth_from_sensor, (3, 3), interpolated between the samples on either side; None outside them."""
         track = self._track
         while self._next < len(track.t_ns) and (self._next == 0 or track.t_ns[self._next - 1] < t_ns):
-            self._ahrs.update_no_magnetometer(track.gyro_dps[self._next], track.accel_g[self._next])
+            gyro_dps = track.gyro_dps[self._next]
+            if self._offset is not None:
+                gyro_dps = self._offset.update(gyro_dps)
+            self._ahrs.update_no_magnetometer(gyro_dps, track.accel_g[self._next])
             self._before = self._after
             self._after = matrix_from_quat_wxyz(np.asarray(self._ahrs.get_quaternion(), dtype=np.float64))
             self._next += 1

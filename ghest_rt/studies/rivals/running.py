@@ -14,7 +14,8 @@ from ghest_rt.simulation.anatomy import anatomy
 from ghest_rt.simulation.scene import arm_from_elw
 from ghest_rt.simulation.sensors import find_sensors
 from ghest_rt.studies.observing.observed import Observed
-from ghest_rt.studies.rivals.angle_errors import Answers, truth_track
+from ghest_rt.studies.observing.scenario import HEIGHT_M
+from ghest_rt.studies.rivals.angle_errors import Answers
 from ghest_rt.studies.rivals.contenders import CONTENDERS
 from ghest_rt.studies.rivals.coupled_chain import CoupledChain
 from ghest_rt.studies.rivals.encoder_only import EncoderOnlyEstimator, PostureModel
@@ -22,14 +23,13 @@ from ghest_rt.studies.rivals.exoskeleton_alone import ExoskeletonAlone
 from ghest_rt.studies.rivals.inertial import ImuProfile, ImuTrack, InertialEstimator, simulate_imus
 from ghest_rt.studies.rivals.neutral import NeutralCalibration, calibrate
 from ghest_rt.studies.rivals.swivel import SwivelAngle
+from ghest_rt.studies.truth import TruthTrack
 
 WITHOUT_CAMERAS = ("exoskeleton", "coupled_chain", "swivel", "swivel_wrist", "inertial")
 """The rivals that look at no marker."""
 
 REST_S = 120.0
 """How long the patient holds still to show what drift does to inertial sensors."""
-
-_HEIGHT_M = 1.75  # the patient's in every study
 
 
 def run_without_cameras(
@@ -44,7 +44,7 @@ def run_without_cameras(
         instants_ns: The grid.
         imu: The inertial sensors; None for the usual ones.
     """
-    body = anatomy(_HEIGHT_M)
+    body = anatomy(HEIGHT_M)
     calibration = calibrate(session.station, body, find_sensors(sensor), seed)
     max_gap_ns = round(session.station.config.estimator.max_gap_ms * 1e6)
     estimators: dict[str, GhEstimator] = {
@@ -101,7 +101,7 @@ def inertial_after_rest_deg(session: Observed, seed: int, rest_s: float = REST_S
 
 def _inertial_in_motion(session: Observed, profile: ImuProfile, seed: int) -> InertialEstimator:
     truth: Sequence[TruthSample] = session.truth
-    track = truth_track(truth)
+    track = TruthTrack.of(truth)
     step_ns = round(1e9 / profile.rate_hz)
 
     def truth_at(t_ns: int) -> TruthSample:
@@ -117,5 +117,5 @@ def _inertial_in_motion(session: Observed, profile: ImuProfile, seed: int) -> In
 def _inertial(session: Observed, tracks: tuple[ImuTrack, ImuTrack]) -> InertialEstimator:
     calibration = session.station.config.calibration
     gh_from_m0: Array = np.array(calibration.m0_from_gh)[:3, :3].T
-    arm_from_m1 = (arm_from_elw(anatomy(_HEIGHT_M).upper_arm_m) @ np.linalg.inv(np.array(calibration.m1_from_elw)))[:3, :3]
+    arm_from_m1 = (arm_from_elw(anatomy(HEIGHT_M).upper_arm_m) @ np.linalg.inv(np.array(calibration.m1_from_elw)))[:3, :3]
     return InertialEstimator(*tracks, gh_from_m0, np.asarray(arm_from_m1))

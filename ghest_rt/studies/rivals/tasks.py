@@ -14,14 +14,19 @@ from ghest_rt.studies.engine.task import Result, Task
 from ghest_rt.studies.observing.observed import Observed, observe
 from ghest_rt.studies.observing.packing import unpack
 from ghest_rt.studies.observing.scenario import Scenario
-from ghest_rt.studies.observing.tasks import observe_task
-from ghest_rt.studies.rivals.angle_errors import Answers, error_statistics, girdle_turn_deg, simple_forecasts_deg, truth_track
+from ghest_rt.studies.observing.tasks import FRAME_COST, observe_task
+from ghest_rt.studies.rivals.angle_errors import (
+    Answers,
+    error_statistics,
+    girdle_turn_deg,
+    on_common_instants,
+    simple_forecasts_deg,
+)
 from ghest_rt.studies.rivals.running import inertial_after_rest_deg, run_without_cameras
 from ghest_rt.studies.session.estimating import estimate_session
+from ghest_rt.studies.truth import TruthTrack
 from ghest_rt.vision.aruco import ArucoDetector
 
-_HERE = "ghest_rt.studies.rivals.tasks"
-_FRAME_COST = {"paper": 1.0, "sr300": 16.0}
 _COMPARE_COST = 4.0
 _REFINEMENT = {
     "aruco": cv2.aruco.CORNER_REFINE_NONE,
@@ -32,12 +37,12 @@ _REFINEMENT = {
 def compare_task(scenario: Scenario, frames: int) -> Task:
     """Return the task that judges every contender on a session of about `frames` frames of each camera."""
     aruco = Task.of(
-        f"{_HERE}:answer_with_aruco",
+        f"{__name__}:answer_with_aruco",
         scenario.model_dump(mode="json"),
-        cost=2 * frames * _FRAME_COST[scenario.sensor],
+        cost=2 * frames * FRAME_COST[scenario.sensor],
     )
     needs = (observe_task(scenario, frames), aruco)
-    return Task.of(f"{_HERE}:compare_session", scenario.model_dump(mode="json"), needs=needs, cost=_COMPARE_COST * frames)
+    return Task.of(f"{__name__}:compare_session", scenario.model_dump(mode="json"), needs=needs, cost=_COMPARE_COST * frames)
 
 
 def answer_with_aruco(parameters: dict[str, object], needs: Sequence[Result]) -> Result:
@@ -62,7 +67,7 @@ def compare_session(parameters: dict[str, object], needs: Sequence[Result]) -> R
     answers.update(_aruco_answers(needs[1]))
     instants_ns = answers["refined"].t_ns
     answers.update(run_without_cameras(session, scenario.sensor, scenario.seed, instants_ns))
-    truth = truth_track(session.truth)
+    truth = TruthTrack.of(session.truth)
     period_ns = round(1e9 / min(info.rate_hz for info in session.camera_infos.values()))
     return Result(
         {
@@ -71,7 +76,12 @@ def compare_session(parameters: dict[str, object], needs: Sequence[Result]) -> R
             **simple_forecasts_deg(truth, instants_ns, period_ns),
             "inertial_after_rest_deg": inertial_after_rest_deg(session, scenario.seed),
             "contenders": {
-                key: {**error_statistics(said, truth), "lag_ms": said.lag_ns * 1e-6} for key, said in answers.items()
+                key: {
+                    **error_statistics(said, truth),
+                    **on_common_instants(said, answers["fused"], truth),
+                    "lag_ms": said.lag_ns * 1e-6,
+                }
+                for key, said in answers.items()
             },
         }
     )

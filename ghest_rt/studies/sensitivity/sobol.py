@@ -13,9 +13,9 @@ from ghest_rt.errors import BadInputError
 from ghest_rt.geometry.so3 import Array
 from ghest_rt.studies.engine.run import Executor, Progress, run_tasks
 from ghest_rt.studies.engine.store import ResultStore
-from ghest_rt.studies.engine.tables import finite
 from ghest_rt.studies.engine.task import Result, Task
 from ghest_rt.studies.movements import frames_of
+from ghest_rt.studies.numbers import finite
 from ghest_rt.studies.observing.packing import unpack
 from ghest_rt.studies.observing.scenario import Scenario
 from ghest_rt.studies.observing.tasks import observe_task

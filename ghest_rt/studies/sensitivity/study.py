@@ -2,13 +2,14 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, cast
+from typing import Any, cast
 
 from ghest_rt.studies.engine.run import Executor, Progress, run_tasks, spent_cpu_s
 from ghest_rt.studies.engine.store import ResultStore
-from ghest_rt.studies.engine.tables import finite
 from ghest_rt.studies.engine.task import Task
 from ghest_rt.studies.movements import METHODS, Movements, frames_of
+from ghest_rt.studies.numbers import finite
+from ghest_rt.studies.observing.scenario import SensorName
 from ghest_rt.studies.observing.tasks import observe_task
 from ghest_rt.studies.paper_values import STEP_M, STEPS
 from ghest_rt.studies.sensitivity.derivative import eq11_relative_sensitivity
@@ -23,7 +24,8 @@ PAPER_SHIFTS_M = tuple(round(STEP_M * step, 6) for step in range(STEPS + 1))
 """Amounts of the paper's analysis, Table 4: 0 to 20 mm."""
 
 QUICK_SHIFTS_M = (0.0, 0.004, 0.010, 0.020)
-QUICK_DURATION_S = 2.0
+QUICK = Movements(duration_s=2.0)
+"""Enough to see that everything runs."""
 
 _FURTHER: dict[Group, tuple[float, ...]] = {
     "turn": (5.0, 10.0),
@@ -49,7 +51,7 @@ class SensitivityPlan:
     """
 
     movements: Movements
-    sensor: Literal["paper", "sr300"] = "paper"
+    sensor: SensorName = "paper"
     seed: int = 1
     methods: tuple[Method, ...] = METHODS
     shifts_m: tuple[float, ...] = PAPER_SHIFTS_M
@@ -81,7 +83,7 @@ def run_sensitivity(
     cases = _cases(plan)
     tasks = [case.task for case in cases]
     results = run_tasks(tasks, store, executor, progress)
-    rows = [_row(case, method, result) for case, result in zip(cases, results, strict=True) for method in plan.methods]
+    rows = [_row(plan, case, method, result) for case, result in zip(cases, results, strict=True) for method in plan.methods]
     _add_sensitivities(rows)
     return rows, spent_cpu_s(tasks, store)
 
@@ -104,9 +106,10 @@ def _cases(plan: SensitivityPlan) -> list[_Case]:
     return cases
 
 
-def _row(case: _Case, method: Method, result: dict[str, object]) -> Row:
+def _row(plan: SensitivityPlan, case: _Case, method: Method, result: dict[str, object]) -> Row:
     found = cast(dict[str, Any], result[method])
     return {
+        "sensor": plan.sensor,
         "movement": case.movement,
         "method": method,
         "group": case.parameter.group,

@@ -25,9 +25,7 @@ def error_statistics(estimates: Iterable[GhEstimate], truth: Sequence[TruthSampl
         mean, as in the parentheses of Tables 5 and 6), `mean`, `max` and the box plot's `whislo`, `q1`, `med`, `q3`, `whishi`
         (quartiles; whiskers at the last error within 1.5 interquartile ranges). None where nothing could be judged.
     """
-    track = TruthTrack()
-    for sample in truth:
-        track.add(sample)
+    track = TruthTrack.of(truth)
     accumulator = ErrorAccumulator()
     found = [accumulator.add(estimate, track.at(estimate.t_sample_ns)) for estimate in estimates]
     errors = [error for error in found if error is not None]

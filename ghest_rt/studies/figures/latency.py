@@ -1,11 +1,27 @@
 """The figure of the latency study: error when published against the speed of the GH joint."""
 
+from collections.abc import Iterator
 from typing import Any
 
-from ghest_rt.studies.figures.style import METHOD_COLORS, new_figure
+from ghest_rt.studies.figures.style import METHOD_COLORS, Drawn, new_figure
 
 _COLORS = {**METHOD_COLORS, "paper_at_once": "#E69F00"}
 _SYMBOLS = {"paper": "s", "paper_at_once": "v", "refined": "o", "fused": "D"}
+
+
+def figures(summary: dict[str, Any]) -> Iterator[Drawn]:
+    """Draw the study's figure.
+
+    Args:
+        summary: Summary of `study latency`.
+    """
+    settings = summary["settings"]
+    speeds = ", ".join(f"×{speed:g}" for speed in settings["speeds"])
+    caption = (
+        f"Error when published against the speed of the GH joint: sensor {settings['sensor']}, "
+        f"{', '.join(settings['movements'])}, {settings['span_s']:g} s of each at {speeds}"
+    )
+    yield Drawn("latency", caption, draw_latency(summary))
 
 
 def draw_latency(summary: dict[str, Any]) -> Any:
@@ -36,7 +52,7 @@ def draw_latency(summary: dict[str, Any]) -> Any:
     right.barh(places, delays, 0.6, color=[_COLORS[who["key"]] for who in summary["candidates"]])
     for place, delay in zip(places, delays, strict=True):
         right.annotate(f"{delay:.1f}", (delay, place), xytext=(3, 0), textcoords="offset points", va="center", fontsize=8)
-    right.set_yticks([])
+    right.set_yticks(places, [who["title"].replace(", ", ",\n") for who in summary["candidates"]])
     right.invert_yaxis()
     right.set_xlim(0.0, 1.2 * max(delays))
     right.set_xlabel("behind the arm (ms)")

@@ -22,15 +22,13 @@ from ghest_rt.simulation.therapy import TherapyMotion, find_movement
 from ghest_rt.simulation.world import World
 from ghest_rt.studies.engine.task import Result, Task
 from ghest_rt.studies.observing.observed import Observed, observe
-from ghest_rt.studies.observing.scenario import Scenario
-from ghest_rt.studies.rivals.angle_errors import Answers, error_columns, truth_track
+from ghest_rt.studies.observing.scenario import HEIGHT_M, Scenario
+from ghest_rt.studies.observing.tasks import FRAME_COST
+from ghest_rt.studies.rivals.angle_errors import Answers, error_columns
 from ghest_rt.studies.session.estimating import estimate_session
 from ghest_rt.studies.truth import TruthTrack
 from ghest_rt.vision.station import Method
 
-_HERE = "ghest_rt.studies.latency_tasks"
-_FRAME_COST = {"paper": 1.0, "sr300": 16.0}
-_HEIGHT_M = 1.75
 _MARGIN_S = 0.5  # of the movement, left out at both ends: movements answer only a little beyond them
 _HALF_STEP_NS = 5_000_000
 
@@ -74,9 +72,9 @@ class PlayedAt:
 
 def latency_task(scenario: Scenario, factor: float, span_s: float) -> Task:
     """Return the task that judges every candidate on a movement played at a speed; `span_s` of it at most."""
-    cost = 2 * 66.6 * span_s / factor * _FRAME_COST[scenario.sensor]
+    cost = 2 * 66.6 * span_s / factor * FRAME_COST[scenario.sensor]
     parameters = {"scenario": scenario.model_dump(mode="json"), "factor": factor, "span_s": span_s}
-    return Task.of(f"{_HERE}:judge_speed", parameters, cost=cost)
+    return Task.of(f"{__name__}:judge_speed", parameters, cost=cost)
 
 
 def judge_speed(parameters: dict[str, object], needs: Sequence[Result]) -> Result:
@@ -86,7 +84,7 @@ def judge_speed(parameters: dict[str, object], needs: Sequence[Result]) -> Resul
         _world(scenario, float(str(parameters["factor"])), float(str(parameters["span_s"]))),
         {method for method, _ in CANDIDATES.values()},
     )
-    truth = truth_track(session.truth)
+    truth = TruthTrack.of(session.truth)
     return Result({key: _judge(session, truth, method, at_once) for key, (method, at_once) in CANDIDATES.items()})
 
 
@@ -141,7 +139,7 @@ def _world(scenario: Scenario, factor: float, span_s: float) -> World:
     station = scenario.model_copy(update={"duration_s": 0.05}).world().station
     return World(
         station,
-        anatomy(_HEIGHT_M),
+        anatomy(HEIGHT_M),
         PlayedAt(motion, factor, span_s),
         find_sensors(scenario.sensor),
         seed=scenario.seed,

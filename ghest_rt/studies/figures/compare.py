@@ -1,9 +1,10 @@
 """Figures of the comparison: every contender's errors, movement by movement, its publication's figure beside."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, cast
 
-from ghest_rt.studies.figures.style import METHOD_COLORS, new_figure
+from ghest_rt.studies.figures.style import METHOD_COLORS, Drawn, new_figure
+from ghest_rt.studies.numbers import span_in_words
 
 Row = dict[str, Any]
 
@@ -17,6 +18,19 @@ _VIEWS = (
 _LEAST_DEG = 1e-3
 
 
+def figures(summary: Row) -> Iterator[Drawn]:
+    """Draw the figures of every sensor.
+
+    Args:
+        summary: Summary of `study compare`.
+    """
+    for sensor in summary["settings"]["sensors"]:
+        of_what = f"sensor {sensor}, {span_in_words(summary['settings']['duration_s'])}"
+        caption = f"Errors of the GH rotation; a symbol per movement: {of_what}"
+        yield Drawn(f"contenders_{sensor}", caption, draw_contenders(summary, sensor))
+        yield Drawn(f"angles_{sensor}", f"Errors angle by angle: {of_what}", draw_angles(summary, sensor))
+
+
 def draw_contenders(summary: Row, sensor: str) -> Any:
     """Return the errors of the GH rotation of every contender: a symbol per movement, a bar at the mean over Table 2's.
 
@@ -25,15 +39,14 @@ def draw_contenders(summary: Row, sensor: str) -> Any:
         sensor: Which sensor.
     """
     figure = new_figure(7.2, 4.2)
-    panels = figure.subplots(1, 2, sharey=True)
+    panels = figure.subplots(1, 2, sharey=True, sharex=True)
     for axes, (quantity, title) in zip(panels, _VIEWS, strict=True):
         _draw_panel(axes, summary, sensor, quantity)
         axes.set_title(title)
         axes.set_xlabel("error of the GH rotation (° RMS)")
     stars = [(who["published_deg"], k) for k, who in enumerate(summary["contenders"]) if who["published_deg"] is not None]
-    for axes in panels:
-        x, y = zip(*stars, strict=True)
-        axes.plot(x, y, marker="*", markersize=9, color="black", linestyle="none", label="in its own publication")
+    x, y = zip(*stars, strict=True)
+    panels[0].plot(x, y, marker="*", markersize=9, color="black", linestyle="none", label="in its own publication")
     _finish(figure, panels, summary)
     return figure
 

@@ -4,16 +4,18 @@ import math
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from typing import Literal, cast
+from typing import Any, cast
 
 import numpy as np
 
 from ghest_rt.geometry.so3 import Array
 from ghest_rt.studies.engine.run import Executor, Progress, run_tasks
 from ghest_rt.studies.engine.store import ResultStore
-from ghest_rt.studies.latency_computing import Clock, measure_computing
-from ghest_rt.studies.latency_tasks import CANDIDATES, latency_task
+from ghest_rt.studies.latency.computing import Clock, measure_computing
+from ghest_rt.studies.latency.tasks import CANDIDATES, latency_task
 from ghest_rt.studies.movements import METHODS, Movements
+from ghest_rt.studies.numbers import plain
+from ghest_rt.studies.observing.scenario import SensorName
 
 BIN_EDGES_DPS = (0.0, 5.0, 10.0, 20.0, 40.0, 60.0, 80.0, 120.0, 160.0, 240.0)
 """Bins of the GH joint's angular speed; the last one is open."""
@@ -49,7 +51,7 @@ class LatencySettings:
 
     movements: Movements
     speeds: tuple[float, ...] = SPEEDS
-    sensor: Literal["paper", "sr300"] = "paper"
+    sensor: SensorName = "paper"
     seed: int = 1
     computing_frames: int = COMPUTING_FRAMES
 
@@ -67,7 +69,7 @@ def latency(
     executor: Executor,
     progress: Progress | None = None,
     clock: Clock = time.perf_counter_ns,
-) -> dict[str, object]:
+) -> dict[str, Any]:
     """Run the study; return its summary, as JSON takes it.
 
     Every sample is judged by the truth at the instant at which it is published, `lag_ms` after the instant it holds for.
@@ -99,7 +101,7 @@ def latency(
         method: measure_computing(clinic, method, settings.computing_frames, clock)
         for method in dict.fromkeys(method for method, _ in CANDIDATES.values())
     }
-    return {
+    summary = {
         "study": "latency",
         "settings": {
             "movements": [scenario.name for scenario in scenarios],
@@ -123,6 +125,7 @@ def latency(
             for key, (method, _) in CANDIDATES.items()
         ],
     }
+    return cast(dict[str, Any], plain(summary))
 
 
 def effective_delay_ms(speed_dps: Array, error_deg: Array) -> float:

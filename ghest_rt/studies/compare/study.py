@@ -4,19 +4,19 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from statistics import fmean
-from typing import Literal, cast
+from typing import Any, cast
 
-from ghest_rt.studies.compare_verdicts import verdict
+from ghest_rt.studies.compare.verdicts import verdict
 from ghest_rt.studies.engine.run import Executor, Progress, run_tasks
 from ghest_rt.studies.engine.store import ResultStore
 from ghest_rt.studies.movements import METHODS, Movements, frames_of
-from ghest_rt.studies.observing.scenario import Scenario
+from ghest_rt.studies.numbers import plain
+from ghest_rt.studies.observing.scenario import Scenario, SensorName
 from ghest_rt.studies.rivals.angle_errors import QUANTITIES
 from ghest_rt.studies.rivals.contenders import CONTENDERS
 from ghest_rt.studies.rivals.running import REST_S
 from ghest_rt.studies.rivals.tasks import compare_task
 
-SensorName = Literal["paper", "sr300"]
 Row = dict[str, object]
 
 
@@ -41,13 +41,13 @@ QUICK = Movements(("COMB",), duration_s=1.5)
 
 def compare(
     settings: CompareSettings, store: ResultStore, executor: Executor, progress: Progress | None = None
-) -> dict[str, object]:
+) -> dict[str, Any]:
     """Run the comparison; return its summary, as JSON takes it.
 
     Returns:
-        `settings`; `inertial_after_rest`, the inertial rival's error after the patient has held still; `rows`, one per sensor,
-        movement, seed and contender; `contenders`, with their publications' figures and the means over movements; `verdicts`,
-        one per sensor, movement and contender.
+        `settings`; `inertial_after_rest`, the inertial rival's error after the patient has held still, mean and range over all
+        sessions; `rows`, one per sensor, movement, seed and contender; `contenders`, with their publications' figures and the
+        means over movements; `verdicts`, one per sensor, movement and contender.
 
     Raises:
         BadInputError: A motion file cannot be read.
@@ -61,7 +61,7 @@ def compare(
     ]
     results = run_tasks([compare_task(s, frames_of(s)) for s in scenarios], store, executor, progress)
     rows = [row for scenario, result in zip(scenarios, results, strict=True) for row in _rows(scenario, result)]
-    return {
+    summary = {
         "study": "compare",
         "settings": {
             "movements": list(dict.fromkeys(scenario.name for scenario in scenarios)),
@@ -69,20 +69,24 @@ def compare(
             "seeds": settings.seeds,
             "duration_s": settings.movements.duration_s,
         },
-        "inertial_after_rest": {
-            "rest_s": REST_S,
-            "error_deg": _mean_by_seed(scenarios, results),
-        },
+        "inertial_after_rest": _after_rest(results),
         "rows": rows,
         "contenders": [{**asdict(who), "measured": _means(rows, key)} for key, who in CONTENDERS.items()],
         "verdicts": _verdicts(rows),
     }
+    return cast(dict[str, Any], plain(summary))
 
 
-def _mean_by_seed(scenarios: Sequence[Scenario], results: Sequence[Mapping[str, object]]) -> float:
-    """Return the mean of what the inertial rival drifts to, over the sensors' seeds."""
-    drift = {s.seed: float(cast(float, r["inertial_after_rest_deg"])) for s, r in zip(scenarios, results, strict=True)}
-    return fmean(drift.values())
+def _after_rest(results: Sequence[Mapping[str, object]]) -> Row:
+    """Return what the inertial rival is off by after rest, over every session: first postures and sensors differ."""
+    drift = [float(cast(float, result["inertial_after_rest_deg"])) for result in results]
+    return {
+        "rest_s": REST_S,
+        "sessions": len(drift),
+        "error_deg": fmean(drift),
+        "least_deg": min(drift),
+        "most_deg": max(drift),
+    }
 
 
 def _rows(scenario: Scenario, result: Mapping[str, object]) -> list[Row]:
@@ -126,22 +130,25 @@ def mean_of(rows: Sequence[Mapping[str, object]], name: str) -> float:
 
 
 def _verdicts(rows: Sequence[Row]) -> list[Row]:
-    """Return for every sensor, movement and contender whether `fused` wins, by the means over seeds."""
-    sessions = list(dict.fromkeys((str(row["sensor"]), str(row["movement"])) for row in rows))
+    """Return for every sensor, movement and contender whether `fused` wins, by the means over seeds where both answer."""
+    sessions = list(dict.fromkeys((str(row["sensor"]), str(row["movement"]), str(row["kind"])) for row in rows))
     verdicts: list[Row] = []
-    for sensor, movement in sessions:
+    for sensor, movement, kind in sessions:
         there = [row for row in rows if (row["sensor"], row["movement"]) == (sensor, movement)]
-        figures = {key: _mean([row for row in there if row["contender"] == key]) for key in CONTENDERS}
-        lag_ms = {str(row["contender"]): float(cast(float, row["lag_ms"])) for row in there}
         simple_deg = min(mean_of(there, "hold_forecast_deg"), mean_of(there, "straight_forecast_deg"))
+        of = {key: [row for row in there if row["contender"] == key] for key in CONTENDERS}
+        fused_answers = mean_of(of["fused"], "answered_fraction")
         for key, who in CONTENDERS.items():
             if key != "fused":
+                mine = of[key]
+                theirs = {name: mean_of(mine, f"common_{name}") for name in QUANTITIES}
+                fused = {name: mean_of(mine, f"fused_common_{name}") for name in QUANTITIES}
                 said = verdict(
                     who,
-                    cast(dict[str, float], figures[key]),
-                    cast(dict[str, float], figures["fused"]),
-                    lag_ms[key],
+                    {**theirs, "answered_fraction": mean_of(mine, "answered_fraction")},
+                    {**fused, "answered_fraction": fused_answers},
+                    float(cast(float, mine[0]["lag_ms"])),
                     simple_deg,
                 )
-                verdicts.append({"sensor": sensor, "movement": movement, "contender": key, **asdict(said)})
+                verdicts.append({"sensor": sensor, "movement": movement, "kind": kind, "contender": key, **asdict(said)})
     return verdicts

@@ -1,0 +1,1 @@
+"""How far published angles are behind the arm."""
