@@ -3,10 +3,11 @@
 import math
 
 import numpy as np
+import pytest
 
 from ghest_rt.estimation.fused.axial import AxialJudge, Slip, twist_rad
 from ghest_rt.estimation.fused.tuning import Tuning
-from ghest_rt.geometry.so3 import rot_x, rot_y, rot_z
+from ghest_rt.geometry.so3 import exp_so3, rot_y, rot_z
 from tests.estimation_fused.stand import MS, START
 
 
@@ -53,10 +54,9 @@ def test_a_stretched_elbow_says_nothing() -> None:
     assert session(0.3, 0.0, elbow_deg=10.0) == Slip()
 
 
-def test_the_twist_is_that_about_the_arm() -> None:
-    swing = rot_y(0.4) @ rot_x(-0.3)
-    V = swing[:, 2]
-    axis = np.array([-V[1], V[0], 0.0]) / math.hypot(V[0], V[1])
-    assert twist_rad(rot_z(0.3)) == 0.3
-    assert abs(axis @ V) < 1.0
-    assert abs(twist_rad(rot_y(0.7))) < 1e-12
+@pytest.mark.parametrize("swing_deg", [(0.0, 0.0), (23.0, -17.0), (-40.0, 80.0), (0.0, 170.0)])
+@pytest.mark.parametrize("twist_deg", [-120.0, 0.0, 17.0, 150.0])
+def test_the_twist_is_that_about_the_arm(swing_deg: tuple[float, float], twist_deg: float) -> None:
+    """However the arm has been swung, about an axis across it, the twist is what it was turned about itself."""
+    swing = exp_so3(np.radians([*swing_deg, 0.0]))
+    assert math.isclose(math.degrees(twist_rad(swing @ rot_z(math.radians(twist_deg)))), twist_deg, abs_tol=1e-9)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ghest_drivers.samples import EncoderSample
-from ghest_rt.estimation.fused.belief import POSES, RATES, SIZE, Belief
+from ghest_rt.estimation.fused.belief import BOTH_GH, GH, GH_RATE, SIZE, Belief
 from ghest_rt.estimation.fused.joints import JointForecast
 from ghest_rt.estimation.fused.measurement import innovation_of
 from ghest_rt.estimation.fused.process import Process
@@ -17,6 +17,7 @@ from ghest_rt.sync.encoder_track import EncoderTrack
 from tests.estimation_fused.stand import MS, START, Trial, estimator_for, events, run
 
 STEP = 1e-6
+ELBOW = np.array([0.0, -0.045, -0.055])
 
 
 def random_belief(rng: np.random.Generator) -> Belief:
@@ -42,9 +43,10 @@ def shifted(belief: Belief, index: int, step: float) -> Belief:
 
 
 def error_between(estimate: Belief, true: Belief) -> Array:
-    """The (18,) error of poses and rates that takes `estimate` to `true`."""
+    """The (24,) error that takes `estimate` to `true`."""
     turns = [log_so3(a @ b.T) for a, b in zip(true.e_from_marker, estimate.e_from_marker, strict=True)]
-    return np.concatenate((turns[0], true.p_gh - estimate.p_gh, turns[1], true.rates - estimate.rates))
+    in_marker = [a - b for a, b in zip(true.gh_in_marker, estimate.gh_in_marker, strict=True)]
+    return np.concatenate((turns[0], true.p_gh - estimate.p_gh, turns[1], *in_marker, true.rates - estimate.rates))
 
 
 @pytest.mark.parametrize("marker", [0, 1])
@@ -59,25 +61,69 @@ def test_the_measurement_jacobian_is_the_derivative(marker: int) -> None:
         assert np.allclose(innovation_of(belief, marker, true.e_from(marker)).residual / STEP, H[:, index], atol=1e-5)
 
 
+def noiseless() -> Process:
+    return Process(Tuning(rotation_density=0.0, position_density=0.0, creep_m2_s=(0.0, 0.0)), ELBOW)
+
+
+def anisotropic(rng: np.random.Generator, sigma: Array) -> Array:
+    """A covariance with these standard deviations that correlates everything with everything."""
+    A = rng.normal(size=(SIZE, 2 * SIZE))
+    P = A @ A.T
+    scale = sigma / np.sqrt(np.diag(P))
+    return np.asarray(P * np.outer(scale, scale))
+
+
+def derivative(process: Process, belief: Belief, t_ns: int, e_from_r1: Array) -> Array:
+    """The (24, 24) derivative of the error after a step with respect to that before it, by central differences."""
+    ends = []
+    for step in (STEP, -STEP):
+        columns = []
+        for index in range(SIZE):
+            end, neighbour = belief.copy(), shifted(belief, index, step)
+            process.advance(end, t_ns, e_from_r1)
+            process.advance(neighbour, t_ns, e_from_r1)
+            columns.append(error_between(end, neighbour))
+        ends.append(np.column_stack(columns))
+    return np.asarray((ends[0] - ends[1]) / (2.0 * STEP))
+
+
+def correlated(P: Array, sigma: Array) -> Array:
+    return np.asarray(P / np.outer(sigma, sigma))
+
+
 def test_the_covariance_moves_as_neighbouring_beliefs_do() -> None:
-    """Small terms are left out on purpose (section 2): they are bounded here."""
+    """Half a second of slow movement: what the rates do to the poses; the terms left out are as small as the movement."""
     rng = np.random.default_rng(3)
     belief = random_belief(rng)
-    process = Process(
-        Tuning(rotation_density=0.0, position_density=0.0, creep_m2_s=(0.0, 0.0)), np.array([0.0, -0.045, -0.055])
-    )
-    moved_r1 = transform(exp_so3(np.array([0.01, -0.02, 0.015])), np.array([0.004, 0.002, -0.003])) @ belief.e_from_r1
-    chosen = [*range(*POSES.indices(SIZE)), *range(*RATES.indices(SIZE))]
-    F = np.empty((18, 18))
-    start = belief.copy()
-    process.advance(start, START + 15 * MS, moved_r1)
-    for column, index in enumerate(chosen):
-        neighbour = shifted(belief, index, STEP)
-        process.advance(neighbour, START + 15 * MS, moved_r1)
-        F[:, column] = error_between(start, neighbour) / STEP
-    told = start.P[np.ix_(chosen, chosen)] / 1e-4
-    assert np.allclose(told, F @ F.T, atol=0.15)
-    assert np.allclose(told[9:, 9:], F[9:, 9:] @ F[9:, 9:].T, atol=1e-4)
+    belief.rates = 2e-3 * rng.normal(size=9)
+    sigma = np.ones(SIZE)
+    sigma[GH] = sigma[BOTH_GH] = sigma[GH_RATE] = 0.3
+    belief.P = 1e-4 * anisotropic(rng, sigma)
+    small = transform(exp_so3(np.array([1e-3, -2e-3, 1e-3])), np.array([4e-4, 2e-4, -3e-4]))
+    end = belief.copy()
+    noiseless().advance(end, START + 500 * MS, small @ belief.e_from_r1)
+    F = derivative(noiseless(), belief, START + 500 * MS, small @ belief.e_from_r1)
+    told, true = end.P, F @ belief.P @ F.T
+    spread = np.sqrt(np.diag(true))
+    assert np.allclose(correlated(told, spread), correlated(true, spread), atol=0.02)
+
+
+def test_the_covariance_of_the_arm_turns_with_the_exoskeleton() -> None:
+    """A large turn about the GH centre, whose own place is known: then nothing is left out."""
+    rng = np.random.default_rng(4)
+    belief = random_belief(rng)
+    belief.rates = np.zeros(9)
+    sigma = 0.01 * rng.uniform(0.3, 3.0, size=SIZE)
+    belief.P = anisotropic(rng, sigma)
+    for known in (GH, GH_RATE):
+        belief.P[known] = belief.P[:, known] = 0.0
+    turn = exp_so3(np.array([0.3, -0.4, 0.5]))
+    about = transform(turn, belief.p_gh - turn @ belief.p_gh)
+    end = belief.copy()
+    noiseless().advance(end, START + 300 * MS, about @ belief.e_from_r1)
+    F = derivative(noiseless(), belief, START + 300 * MS, about @ belief.e_from_r1)
+    assert np.allclose(correlated(end.P, sigma), correlated(F @ belief.P @ F.T, sigma), atol=1e-5)
+    assert not np.allclose(correlated(end.P, sigma), correlated(belief.P, sigma), atol=0.1)
 
 
 def test_the_arm_follows_the_exoskeleton_that_carries_it() -> None:
@@ -88,7 +134,7 @@ def test_the_arm_follows_the_exoskeleton_that_carries_it() -> None:
     turn = exp_so3(np.array([0.3, -0.4, 0.5]))
     about = transform(turn, belief.p_gh - turn @ belief.p_gh)
     moved = belief.copy()
-    Process(Tuning(), np.array([0.0, -0.045, -0.055])).advance(moved, START + 300 * MS, about @ belief.e_from_r1)
+    Process(Tuning(), ELBOW).advance(moved, START + 300 * MS, about @ belief.e_from_r1)
     assert np.allclose(moved.e_from_marker[1], turn @ belief.e_from_marker[1], atol=1e-9)
 
 
