@@ -1,7 +1,7 @@
 """A test stand of geometry alone: known movements, an exoskeleton that can take any pose, noise, latency, drift and outages."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Container
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -42,12 +42,14 @@ LINK_FROM_CAMERA = {
 }
 M0_FROM_GH = transform(np.eye(3), [-0.055, -0.010, -0.085])
 M1_FROM_ELW = transform(np.eye(3), [0.0, -0.045, -0.055])
+# The forearm, bent by about a right angle, is strapped to l8.
+FOREARM: dict[str, object] = {"link": "l8", "axis": (0.0, 1.0, 0.0)}
 # Encoders of 14 bits a turn; the slides resolve as finely at an arm's length.
 _STEPS = np.repeat((1e-4, 2.0 * math.pi / 2**14), 3)
 _ARM_FROM_ELW = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 
 
-def config(**estimator: object) -> StationConfig:
+def config(elbow: dict[str, object] | None = None, **estimator: object) -> StationConfig:
     disks = ((214, 40, 57), (124, 181, 24), (0, 158, 165), (122, 62, 180))
     marker = {"half_spacing_m": 0.018, "disk_radius_m": 0.008, "plate_m": 0.06, "disk_rgb": disks}
     return StationConfig.model_validate(
@@ -67,6 +69,7 @@ def config(**estimator: object) -> StationConfig:
                 "m0_from_gh": M0_FROM_GH.tolist(),
                 "m1_from_elw": M1_FROM_ELW.tolist(),
             },
+            "elbow": elbow,
             "estimator": estimator,
         }
     )
@@ -96,20 +99,28 @@ def rest(t: float) -> tuple[float, float, float]:
     return comb(1.0)
 
 
-def pose(angles: Callable[[float], tuple[float, float, float]], t_ns: int) -> Pose:
-    """The arm in the movement; the shoulder girdle follows it by a sixth, the forearm module keeps level and tilts a little."""
+def nothing(t: float) -> Array:
+    return np.eye(3)
+
+
+def pose(angles: Callable[[float], tuple[float, float, float]], t_ns: int, beyond: Callable[[float], Array] = nothing) -> Pose:
+    """The arm in the movement; the shoulder girdle follows it by a sixth, the forearm module keeps level and tilts a little.
+
+    `beyond` is a rotation of the arm, in its own axes, that the exoskeleton does not go along with.
+    """
     t = (t_ns - START) * 1e-9
     a, b, g = angles(t)
-    gh = rot_y(a) @ rot_x(b) @ rot_z(g)
+    carried = rot_y(a) @ rot_x(b) @ rot_z(g)
+    gh = carried @ beyond(t)
     e_from_gh_R = rot_x(0.12 * b) @ rot_y(0.16 * a)
     p_gh = np.array([0.04, 0.025, -0.15]) + e_from_gh_R @ np.array([0.0, -0.14, 0.03])
     e_from_gh = transform(e_from_gh_R, p_gh)
     R = e_from_gh_R @ gh
-    p_elw = p_gh - LENGTH_M * R[:, 2]
-    e_from_elw = transform(R @ _ARM_FROM_ELW, p_elw)
+    e_from_elw = transform(R @ _ARM_FROM_ELW, p_gh - LENGTH_M * R[:, 2])
     # The forearm module: turned with the arm but for most of its flexion; its pivot is not centred on the elbow.
+    R = e_from_gh_R @ carried
     l8 = R @ rot_y(-0.8 * a) @ rot_z(0.05 * g + 0.05 * a)
-    p_l8 = p_elw + R @ np.array([-0.012, 0.004, 0.010]) - l8 @ np.array([0.0, -0.11, 0.0])
+    p_l8 = p_gh - LENGTH_M * R[:, 2] + R @ np.array([-0.012, 0.004, 0.010]) - l8 @ np.array([0.0, -0.11, 0.0])
     # Its axes are such that its joints are far from their singularity where the arm's angles are at theirs.
     l8 = l8 @ rot_y(math.pi / 2)
     yaw, pitch, roll = _yxz(l8)
@@ -156,6 +167,10 @@ class Trial:
     arm_length_m: float | None = None
     drifts: tuple[Drift, ...] = ()
     blind: tuple[Blind, ...] = ()
+    beyond: Callable[[float], Array] = nothing
+    encoder_step_ms: float = 15.6
+    lost_rows: Container[int] = ()
+    forearm: bool = False
     estimator: dict[str, object] = field(default_factory=dict)
     spoil: Callable[[MarkerObservation], MarkerObservation] = lambda observation: observation
 
@@ -186,9 +201,10 @@ def events(trial: Trial) -> list[tuple[int, MarkerObservation | EncoderSample]]:
     found: list[tuple[int, MarkerObservation | EncoderSample]] = []
     t, k = START - 100 * MS, 0
     while t < end:
-        joints = np.rint(pose(trial.angles, t).joints / _STEPS) * _STEPS
-        found.append((t + 2 * MS, EncoderSample(k, joints, t, t + 2 * MS, t)))
-        t += round((15.6 + 0.66 * float(np.clip(rng.standard_normal(), -3, 3))) * MS)
+        if k not in trial.lost_rows:
+            joints = np.rint(pose(trial.angles, t, trial.beyond).joints / _STEPS) * _STEPS
+            found.append((t + 2 * MS, EncoderSample(k, joints, t, t + 2 * MS, t)))
+        t += round((trial.encoder_step_ms + 0.66 * float(np.clip(rng.standard_normal(), -3, 3))) * MS)
         k += 1
     sigma = np.repeat((math.radians(trial.rotation_deg), trial.position_mm * 1e-3), 3)
     for camera, marker, phase_ms in (("r0", "m0", 0.0), ("r1", "m1", 7.0)):
@@ -209,7 +225,7 @@ def _observe(trial: Trial, unseen: MarkerObservation, noise: Array, sigma: Array
     outage = next((b for b in trial.blind if b.marker == marker and b.from_s <= t_s < b.to_s), None)
     if outage is not None:
         return unseen if outage.frames else None
-    truth = pose(trial.angles, unseen.t_capture_ns)
+    truth = pose(trial.angles, unseen.t_capture_ns, trial.beyond)
     T = truth.e_from_m0 if marker == "m0" else truth.e_from_m1
     for drift in trial.drifts:
         if drift.marker == marker and t_s >= drift.from_s:
@@ -222,7 +238,7 @@ def _observe(trial: Trial, unseen: MarkerObservation, noise: Array, sigma: Array
 
 
 def estimator_for(trial: Trial) -> GhEstimator:
-    station = config(**trial.estimator)
+    station = config(FOREARM if trial.forearm else None, **trial.estimator)
     period_ns = dict.fromkeys(("r0", "r1"), round(1e9 / trial.rate_hz))
     if trial.method == "fused":
         return FusedEstimator(ArmChain(station, URDF, "urdf", JOINTS), 100 * MS, period_ns, arm_length_m=trial.arm_length_m)
@@ -245,7 +261,7 @@ def run(trial: Trial, estimator: GhEstimator | None = None) -> list[Judged]:
                 estimator.add_marker(event[1])
             event = next(waiting, None)
         found = estimator.estimate(t)
-        truth = pose(trial.angles, t).gh_from_arm
+        truth = pose(trial.angles, t, trial.beyond).gh_from_arm
         error = None if found.gh_from_arm is None else log_so3(truth @ found.gh_from_arm.T)
         judged.append(Judged((t - START) * 1e-9, found, error))
     return judged
@@ -262,3 +278,31 @@ def slide(axis: int, metres: float = 0.02) -> Array:
 
 def turn(axis: int, degrees: float = 5.0) -> Array:
     return transform(exp_so3(math.radians(degrees) * np.eye(3)[axis]), np.zeros(3))
+
+
+def spoilt(
+    marker: str, frames: Container[int], spoil: Callable[[Array], Array]
+) -> Callable[[MarkerObservation], MarkerObservation]:
+    """For `Trial.spoil`: some frames' poses of a marker in its camera are other ones."""
+
+    def maybe(observation: MarkerObservation) -> MarkerObservation:
+        if observation.marker != marker or observation.seq not in frames or observation.camera_from_marker is None:
+            return observation
+        return replace(observation, camera_from_marker=spoil(observation.camera_from_marker))
+
+    return maybe
+
+
+def slipping(degrees: float, from_s: float, to_s: float) -> Callable[[MarkerObservation], MarkerObservation]:
+    """For `Trial.spoil`: m1 turns about the line of the arm, evenly, between two instants."""
+    on_line = transform(np.eye(3), M1_FROM_ELW[:3, 3])
+
+    def turned(observation: MarkerObservation) -> MarkerObservation:
+        if observation.marker != "m1" or observation.camera_from_marker is None:
+            return observation
+        t_s = (observation.t_capture_ns - START) * 1e-9
+        share = min(max((t_s - from_s) / (to_s - from_s), 0.0), 1.0)
+        slipped = on_line @ turn(1, share * degrees) @ inverse(on_line)
+        return replace(observation, camera_from_marker=observation.camera_from_marker @ slipped)
+
+    return turned

@@ -1,16 +1,16 @@
 """Blind cameras, silent encoders, wrong poses: bridged as long as that is honest, told when not."""
 
 import itertools
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from ghest_rt.estimation.fused.estimator import FusedEstimator
 from ghest_rt.geometry.se3 import transform
 from ghest_rt.geometry.so3 import angle_between_rad, exp_so3
 from ghest_rt.messages.results import MarkerObservation, MarkerStatus, Reason, Status
-from tests.estimation_fused.stand import Blind, Judged, Trial, estimator_for, rms_deg, run
+from tests.estimation_fused.stand import Blind, Judged, Trial, estimator_for, rms_deg, run, slipping, spoilt
 
 FROM_S, TO_S = 2.5, 3.0
 
@@ -76,24 +76,59 @@ def test_after_a_long_outage_of_everything_it_is_as_good_as_before() -> None:
     assert rms_deg(judged, 5.2) < 0.25
 
 
-def spoilt_at(marker: str, frame: int, spoil: Callable[[np.ndarray], np.ndarray]) -> Callable[..., MarkerObservation]:
-    def maybe(observation: MarkerObservation) -> MarkerObservation:
-        if observation.marker != marker or observation.seq != frame or observation.camera_from_marker is None:
-            return observation
-        return replace(observation, camera_from_marker=spoil(observation.camera_from_marker))
-
-    return maybe
-
-
 @pytest.mark.parametrize("marker", ["m0", "m1"])
 def test_a_single_wrong_pose_is_left_aside_and_counted(marker: str) -> None:
     """The mirror solution of a plane seen from the front: the plate tilted to the other side."""
     tilted = transform(exp_so3(np.array([0.5, 0.0, 0.0])), np.zeros(3))
-    trial = Trial(duration_s=3.0, spoil=spoilt_at(marker, 90, lambda T: T @ tilted))
+    trial = Trial(duration_s=3.0, spoil=spoilt(marker, (90,), lambda T: T @ tilted))
     estimator = estimator_for(trial)
     judged = run(trial, estimator)
     assert estimator.counts() == {f"{marker}_outlier": 1}
     assert rms_deg(judged, 1.3, 2.0) < 0.25
+
+
+def test_a_marker_seen_where_it_cannot_be_is_not_seen() -> None:
+    """Frames come, with poses that the gate refuses: that is not told as missing frames. The limit lets nothing be bridged."""
+    spoil = spoilt("m1", range(60, 67), lambda T: T @ transform(exp_so3(np.array([0.5, 0.0, 0.0])), np.zeros(3)))
+    trial = Trial(duration_s=1.25, spoil=spoil, estimator={"sigma_limit_deg": 0.05})
+    estimator = estimator_for(trial)
+    lost = [j for j in during(run(trial, estimator), 1.0, 2.0) if j.estimate.status is Status.LOST]
+    assert estimator.counts()["m1_outlier"] >= 7
+    assert lost
+    assert {j.estimate.reason for j in lost} == {Reason.M1_NOT_SEEN}
+
+
+@pytest.mark.parametrize(("slip_deg", "kept"), [(0.0, True), (6.0, False)], ids=["no slip", "slip"])
+def test_what_is_unknown_of_a_slip_alone_ends_the_bridging(slip_deg: float, kept: bool) -> None:
+    """A cuff that has slipped about the arm leaves a degree unknown: above the limit, although the filter itself is certain."""
+    blind = (Blind("m1", 3.1, 9.0),)
+    spoil = slipping(slip_deg, 2.1, 2.4)
+    judged = run(Trial(duration_s=3.3, forearm=True, spoil=spoil, blind=blind, estimator={"sigma_limit_deg": 0.6}))
+    last = judged[-1].estimate
+    assert judged[int(3.0 * 66.6)].estimate.status is not Status.LOST
+    assert (last.status, last.reason) == ((Status.DEGRADED, Reason.BRIDGED) if kept else (Status.LOST, Reason.M1_NOT_SEEN))
+
+
+def test_refused_poses_are_no_evidence_of_the_elbow_or_the_forearm() -> None:
+    """Every other frame of m1 is wrong for half a second: what is known of the elbow is as if they had not shown the marker."""
+    wrong = range(60, 90, 2)
+    tilted = transform(exp_so3(np.array([0.5, 0.0, 0.0])), np.zeros(3))
+
+    def hidden(observation: MarkerObservation) -> MarkerObservation:
+        if observation.marker == "m0" or observation.seq not in wrong:
+            return observation
+        return replace(observation, status=MarkerStatus.NOT_FOUND, camera_from_marker=None)
+
+    found = []
+    for spoil in (hidden, spoilt("m1", wrong, lambda T: T @ tilted)):
+        trial = Trial(duration_s=1.6, forearm=True, spoil=spoil)
+        estimator = estimator_for(trial)
+        assert isinstance(estimator, FusedEstimator)
+        run(trial, estimator)
+        found.append((estimator, np.concatenate((estimator._elbow.recent, estimator._axial._settled.recent))))
+    assert found[0][0].counts() == {}
+    assert found[1][0].counts() == {"m1_outlier": len(wrong)}
+    assert np.allclose(found[0][1], found[1][1], atol=1e-6)
 
 
 def test_weaker_poses_degrade_the_status() -> None:
