@@ -9,6 +9,9 @@ from ghest_rt.geometry.so3 import Array
 
 Depth = NDArray[np.uint16]
 _SAME_PX = 0.05
+_EMPTY = np.iinfo(np.uint16).max
+# What is farther than the pixels around it by this factor lies on a surface behind them.
+_BEHIND = 1.05
 
 
 def is_registered(info: CameraInfo) -> bool:
@@ -55,7 +58,7 @@ class DepthRegistration:
         seen = depth_counts > 0
         points_m = self._rays[seen] * (depth_counts[seen, None] * info.depth_unit_m) + self._shift_m
         points_m = points_m[points_m[:, 2] > info.depth_unit_m]
-        registered = np.full((info.color.height_px, info.color.width_px), np.iinfo(np.uint16).max, dtype=np.uint16)
+        registered = np.full((info.color.height_px, info.color.width_px), _EMPTY, dtype=np.uint16)
         if len(points_m):
             pixels, _ = cv2.projectPoints(
                 points_m, np.zeros(3), np.zeros(3), info.color.matrix, np.array(info.color.distortion)
@@ -64,6 +67,9 @@ class DepthRegistration:
             counts = np.rint(points_m[:, 2] / info.depth_unit_m)
             inside = (u >= 0) & (u < info.color.width_px) & (v >= 0) & (v < info.color.height_px) & (counts < registered[0, 0])
             np.minimum.at(registered, (v[inside], u[inside]), counts[inside].astype(np.uint16))
-        # Neighbouring measurements may land two pixels apart: what is empty takes the nearest surface next to it.
-        filled = np.where(registered == np.iinfo(np.uint16).max, cv2.erode(registered, np.ones((3, 3), np.uint8)), registered)
-        return np.where(filled == np.iinfo(np.uint16).max, np.uint16(0), filled).astype(np.uint16)
+        # Neighbouring measurements may land two pixels apart: what is empty between takes the nearest surface next to it, as
+        # does a pixel that shows a surface behind through such a gap.
+        nearest = cv2.erode(registered, np.ones((3, 3), np.uint8))
+        filled = np.where(registered == _EMPTY, nearest, registered)
+        filled = np.where(filled > _BEHIND * cv2.medianBlur(filled, 3), nearest, filled)
+        return np.where(filled == _EMPTY, np.uint16(0), filled).astype(np.uint16)

@@ -127,6 +127,19 @@ def test_registered_depth_lies_on_the_surface_that_colour_sees():
         assert depth[v, u] * info.depth_unit_m == pytest.approx((n @ p) / (n @ ray), abs=0.6e-3)
 
 
+def test_registered_depth_never_shows_a_surface_through_the_one_in_front():
+    info = sr300_camera()
+    for pose in ((0.176, 5.995, 3.139, [0.003, 0.012, 0.217]), (0.12, 2.654, 0.178, [0.004, 0.004, 0.205])):
+        scene = Scene(facing_pose(*pose))
+        depth = DepthRegistration(info)(render(scene, info, samples=1).depth_counts)
+        assert np.count_nonzero(depth > 0.3 / info.depth_unit_m) > 1000, "there is something behind"
+        square = MARKER.half_spacing_m * np.stack(np.meshgrid(*2 * [np.linspace(-1.0, 1.0, 80)]), axis=-1).reshape(-1, 2)
+        x, y, z = (square @ scene.pose[:3, :2].T + scene.pose[:3, 3]).T
+        u = np.rint(info.color.fx_px * x / z + info.color.cx_px).astype(int)
+        v = np.rint(info.color.fy_px * y / z + info.color.cy_px).astype(int)
+        assert depth[v, u].max() * info.depth_unit_m < z.max() + 0.005
+
+
 def test_reduced_depth_of_the_same_view_counts_as_registered():
     info = paper_camera()
     color, half = info.color, 0.5
