@@ -8,6 +8,8 @@ import pytest
 
 pytest.importorskip("mujoco", reason="needs the extra sim")
 
+from ghest_drivers.samples import RgbdFrame
+from ghest_rt.config.load import LoadedStation
 from ghest_rt.errors import BadInputError
 from ghest_rt.estimation.pipeline import Pipeline
 from ghest_rt.messages.results import Reason, Status
@@ -56,14 +58,23 @@ def test_its_recording_has_no_depth_and_says_so(recordings: dict[str, Path]) -> 
 
 
 def test_depth_is_left_aside_where_the_station_says_so(recordings: dict[str, Path]) -> None:
-    """The same images with and without depth give the same poses once the station leaves depth out."""
+    """The same images with and without depth give the same poses once the station leaves depth out, and only then."""
     with_depth, without = Recording(recordings["with_depth"]), Recording(recordings["color_only"])
-    poses = []
-    for recording in (with_depth, without):
-        pipeline = Pipeline(without.station, recording.camera_infos, recording.encoder_joints, "refined")
-        frame = next(event for event in recording.events() if hasattr(event, "color_rgb"))
-        poses.append(pipeline.observe(frame).camera_from_marker)
-    assert np.array_equal(poses[0], poses[1])
+    deep, flat = (
+        next(event for event in recording.events() if isinstance(event, RgbdFrame)) for recording in (with_depth, without)
+    )
+    assert deep.depth_counts is not None
+    assert flat.depth_counts is None
+    assert np.array_equal(deep.color_rgb, flat.color_rgb)
+
+    def pose(station: LoadedStation, frame: RgbdFrame) -> np.ndarray:
+        pipeline = Pipeline(station, with_depth.camera_infos, with_depth.encoder_joints, "refined")
+        found = pipeline.observe(frame).camera_from_marker
+        assert found is not None
+        return found
+
+    assert np.array_equal(pose(without.station, deep), pose(without.station, flat))
+    assert not np.array_equal(pose(with_depth.station, deep), pose(without.station, deep))
 
 
 def test_the_papers_method_needs_depth(recordings: dict[str, Path]) -> None:
