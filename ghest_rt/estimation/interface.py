@@ -21,8 +21,9 @@ class GhEstimator(Protocol):
     def estimate(self, t_ns: int) -> GhEstimate:
         """Return the GH joint at `t_ns`, from what has been added so far.
 
-        An instant that the inputs do not cover gives an estimate without angles that says why: nothing is extrapolated, and
-        nothing old is presented as new.
+        An instant that the inputs do not cover gives an estimate without angles that says why, or, from a method that
+        forecasts (`fused`), one with a covariance that has grown accordingly, `degraded` as soon as more is missing than
+        usual. Nothing old is presented as new.
         """
         ...
 
