@@ -129,8 +129,8 @@ CONTENDERS = {
             published_deg=None,
             lag_ms=15.0,
             caveat=(
-                "favoured here: true attitudes at the start, sensors screwed to the bones, at most half a minute; its heading "
-                "drifts on with every minute of a session"
+                "favoured here: true attitudes at the start, sensors screwed to the bones, at most half a minute; the filter's "
+                "correction of the gyroscopes' offset may take slow movement for rest, and nothing corrects its heading"
             ),
             strength="the true attitudes were given at the start and the recording is too short for drift",
         ),
