@@ -57,7 +57,7 @@ def test_figures_beyond_the_papers_are_drawn(tmp_path: Path) -> None:
         for output in ("position_m", "orientation_deg")
         for p in sobol_parameters()
     ]
-    for name, figure in (("further", draw_further(rows)), ("sobol", draw_sobol(indices, "SFE"))):
+    for name, figure in (("further", draw_further(rows)), ("sobol", draw_sobol(indices, "SFE", 16))):
         paths = save_figure(figure, tmp_path, name)
         assert [path.suffix for path in paths] == [".png", ".svg", ".pdf"]
         assert all(path.stat().st_size > 5000 for path in paths)

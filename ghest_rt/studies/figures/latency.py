@@ -1,5 +1,6 @@
 """The figure of the latency study: error when published against the speed of the GH joint."""
 
+import textwrap
 from collections.abc import Iterator
 from typing import Any
 
@@ -52,11 +53,11 @@ def draw_latency(summary: dict[str, Any]) -> Any:
     right.barh(places, delays, 0.6, color=[_COLORS[who["key"]] for who in summary["candidates"]])
     for place, delay in zip(places, delays, strict=True):
         right.annotate(f"{delay:.1f}", (delay, place), xytext=(3, 0), textcoords="offset points", va="center", fontsize=8)
-    right.set_yticks(places, [who["title"].replace(", ", ",\n") for who in summary["candidates"]])
+    right.set_yticks(places, [textwrap.fill(who["title"], 14) for who in summary["candidates"]])
     right.invert_yaxis()
     right.set_xlim(0.0, 1.2 * max(delays))
     right.set_xlabel("behind the arm (ms)")
-    right.set_title("slope of error against speed")
+    right.set_title("slope of the curves")
     right.grid(axis="y", visible=False)
     handles, labels = left.get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=2, frameon=False)

@@ -39,23 +39,25 @@ def figures(summary: Mapping[str, Any]) -> Iterator[Drawn]:
         number = FIGURES.get(movement, "")
         for method in methods:
             caption = f"Figure {number}".strip() + f": {movement}, method {method}, {of_what}"
-            picture = draw_figure_14(rows, movement, method)
+            picture = draw_figure_14(rows, movement, method, of_what)
             yield Drawn(f"figure{number}_{movement}_{method}", caption, picture, folded=method != "paper")
     for movement in dict.fromkeys(cast(str, r["movement"]) for r in indices):
         caption = (
-            f"Sobol indices on a surrogate of the chain, {movement}: N = {summary['sobol']['samples']} base samples, "
-            f"{of_what}; bars end to end are 95 % confidence intervals"
+            f"Sobol indices on a surrogate of the chain, {movement}: N = {summary['sobol']['samples']} base samples, {of_what}"
         )
-        yield Drawn(f"sobol_{movement}", caption, draw_sobol(indices, movement), folded=movement != "COMB")
+        yield Drawn(
+            f"sobol_{movement}", caption, draw_sobol(indices, movement, summary["sobol"]["samples"]), folded=movement != "COMB"
+        )
 
 
-def draw_figure_14(rows: Sequence[Row], movement: str, method: str) -> Any:
+def draw_figure_14(rows: Sequence[Row], movement: str, method: str, of_what: str) -> Any:
     """Return the figure of one movement (14 SAbAd, 15 SFE, 16 SIR, 17 COMB) in the paper's four panels.
 
     Args:
         rows: Rows of a sensitivity analysis.
         movement: Which movement.
         method: Which method.
+        of_what: Sensor and duration, in words.
     """
     chosen = [r for r in rows if (r["group"], r["movement"], r["method"]) == ("shift", movement, method)]
     figure = new_figure(7.2, 5.6)
@@ -80,7 +82,7 @@ def draw_figure_14(rows: Sequence[Row], movement: str, method: str) -> Any:
         axes.set_ylabel(label)
     handles, labels = axes.get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=3, frameon=False)
-    figure.suptitle(f"{movement}, method {method}", fontsize=10)
+    figure.suptitle(f"{movement}, method {method}: {of_what}", fontsize=9)
     return figure
 
 
@@ -179,7 +181,7 @@ def draw_further(rows: Sequence[Row]) -> Any:
     return figure
 
 
-def draw_sobol(rows: Sequence[Row], movement: str) -> Any:
+def draw_sobol(rows: Sequence[Row], movement: str, samples: int) -> Any:
     """Return the Sobol indices of one movement, position and orientation side by side, with 95 % confidence intervals."""
     chosen = [r for r in rows if r["movement"] == movement]
     figure = new_figure(7.2, 5.8)
@@ -200,11 +202,12 @@ def draw_sobol(rows: Sequence[Row], movement: str) -> Any:
                 label=label,
             )
         axes.set_yticks(places, [cast(str, r["parameter"]).replace("_", " ") for r in of_output])
-        axes.set_title(f"{title}, {movement}")
+        axes.set_title(title)
         axes.axvline(0.0, color="0.3", linewidth=0.8)
         axes.set_xlabel("share of the variance (dimensionless)")
         axes.grid(axis="y", visible=False)
     panels[0].invert_yaxis()
+    figure.suptitle(f"{movement}, {samples} base samples; lines: 95 % confidence intervals", fontsize=9)
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=2, frameon=False)
     return figure
