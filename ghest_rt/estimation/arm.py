@@ -56,14 +56,14 @@ def step3_4_5_e_from_arm(e_from_gh: Array, e_from_elw: Array) -> Array | None:
     Returns:
         (4, 4), metres; None if the two centres coincide or the x axis lies along the arm: no frame then.
     """
-    gx, gy, gz = (float(v) for v in e_from_gh[:3, 3])
-    ex, ey, ez = (float(v) for v in e_from_elw[:3, 3])
+    gx, gy, gz = e_from_gh[:3, 3].tolist()
+    ex, ey, ez = e_from_elw[:3, 3].tolist()
     vx, vy, vz = gx - ex, gy - ey, gz - ez
     length = math.sqrt(vx * vx + vy * vy + vz * vz)
     if not length > _SHORTEST_ARM_M:
         return None
     vx, vy, vz = vx / length, vy / length, vz / length
-    ux, uy, uz = (float(v) for v in e_from_elw[:3, 0])
+    ux, uy, uz = e_from_elw[:3, 0].tolist()
     along = ux * vx + uy * vy + uz * vz
     xx, xy, xz = ux - along * vx, uy - along * vy, uz - along * vz
     sine = math.sqrt(xx * xx + xy * xy + xz * xz)

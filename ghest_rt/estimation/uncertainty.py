@@ -80,7 +80,7 @@ def euler_sigma_rad(gh_from_arm: Array, covariance: Array) -> tuple[float, float
         gh_from_arm: (3, 3) rotation.
         covariance: (3, 3) of its rotation error, rad, GH axes.
     """
-    vx, vy, vz = (float(v) for v in gh_from_arm[:, 2])
+    vx, vy, vz = gh_from_arm[:, 2].tolist()
     cosine_b = math.hypot(vx, vz)
     if cosine_b < 1e-9:
         sine_a, cosine_a = 0.0, 1.0
@@ -96,6 +96,6 @@ def euler_sigma_rad(gh_from_arm: Array, covariance: Array) -> tuple[float, float
             [sine_a / cosine_b, 0.0, cosine_a / cosine_b],
         ]
     )
-    variances = np.einsum("ij,jk,ik->i", rows, covariance, rows)
-    a, b, g = (min(math.sqrt(max(float(v), 0.0)), _UNKNOWN_RAD) for v in variances)
+    variances = ((rows @ covariance) * rows).sum(axis=1).tolist()
+    a, b, g = (min(math.sqrt(max(v, 0.0)), _UNKNOWN_RAD) for v in variances)
     return a, b, g

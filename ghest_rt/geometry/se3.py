@@ -5,10 +5,12 @@ from numpy.typing import ArrayLike
 
 from ghest_rt.geometry.so3 import Array, slerp
 
+_EYE = np.eye(4)
+
 
 def transform(R: Array, p_m: ArrayLike) -> Array:
     """Return the transform with rotation R (3, 3) and translation p_m (3,)."""
-    T = np.eye(4)
+    T = _EYE.copy()
     T[:3, :3] = R
     T[:3, 3] = p_m
     return T
@@ -16,7 +18,7 @@ def transform(R: Array, p_m: ArrayLike) -> Array:
 
 def inverse(T: Array) -> Array:
     """Return the inverse of a rigid transform."""
-    out = np.eye(4)
+    out = _EYE.copy()
     R_t = T[:3, :3].T
     out[:3, :3] = R_t
     out[:3, 3] = -(R_t @ T[:3, 3])

@@ -15,13 +15,13 @@ _SMALL_RAD = 1e-7
 
 def skew(v: Array) -> Array:
     """Return the (3, 3) matrix [v]x with [v]x w = v x w."""
-    x, y, z = float(v[0]), float(v[1]), float(v[2])
+    x, y, z = v.tolist()
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
 def exp_so3(rotvec_rad: Array) -> Array:
     """Return the rotation matrix of a rotation vector (Rodrigues)."""
-    x, y, z = float(rotvec_rad[0]), float(rotvec_rad[1]), float(rotvec_rad[2])
+    x, y, z = rotvec_rad.tolist()
     angle2 = x * x + y * y + z * z
     angle = math.sqrt(angle2)
     if angle < _SMALL_RAD:
@@ -40,7 +40,7 @@ def exp_so3(rotvec_rad: Array) -> Array:
 
 def log_so3(R: Array) -> Array:
     """Return the rotation vector of a rotation matrix, angle in [0, pi]."""
-    w, x, y, z = (float(q) for q in quat_wxyz_from_matrix(R))
+    w, x, y, z = quat_wxyz(R)
     sine = math.sqrt(x * x + y * y + z * z)
     factor = 2.0 / w if sine < _SMALL_RAD else 2.0 * math.atan2(sine, w) / sine
     return np.array([factor * x, factor * y, factor * z])
@@ -53,6 +53,11 @@ def angle_between_rad(R_a: Array, R_b: Array) -> float:
 
 def quat_wxyz_from_matrix(R: Array) -> Array:
     """Return the unit quaternion (w, x, y, z) with w >= 0 (Shepperd's method: no cancellation anywhere)."""
+    return np.array(quat_wxyz(R))
+
+
+def quat_wxyz(R: Array) -> tuple[float, float, float, float]:
+    """Return `quat_wxyz_from_matrix` as plain numbers."""
     (m00, m01, m02), (m10, m11, m12), (m20, m21, m22) = R.tolist()
     trace = m00 + m11 + m22
     largest = max(trace, m00, m11, m22)
@@ -67,7 +72,7 @@ def quat_wxyz_from_matrix(R: Array) -> Array:
     norm = math.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
     if q[0] < 0.0:
         norm = -norm
-    return np.array([q[0] / norm, q[1] / norm, q[2] / norm, q[3] / norm])
+    return q[0] / norm, q[1] / norm, q[2] / norm, q[3] / norm
 
 
 def matrix_from_quat_wxyz(q: Array) -> Array:

@@ -64,7 +64,7 @@ def test_the_published_covariance_is_that_of_the_scatter(make_clinic: Callable[.
     covariances = {camera: factor @ factor.T for camera, factor in factors.items()}
 
     def estimate(noisy: bool) -> Any:
-        estimator = make_estimator(clinic.config, clinic.urdf, "u", ("yaw", "reach"))
+        estimator = make_estimator(clinic.config, clinic.urdf, "u", ("yaw", "reach"), method="refined")
         estimator.add_encoder(clinic.encoder(truth, T))
         for camera in ("r0", "r1"):
             seen = clinic.observation(camera, truth, T).camera_from_marker
@@ -108,7 +108,7 @@ def test_an_uncertain_angle_is_degraded_and_still_told(make_clinic: Callable[...
     for limit_deg, status, reason in ((5.0, Status.VALID, Reason.NONE), (0.5, Status.DEGRADED, Reason.UNCERTAIN)):
         clinic = make_clinic(4, sigma_limit_deg=limit_deg)
         truth = clinic.posture(np.eye(3), np.eye(4), np.zeros(2))
-        estimator = make_estimator(clinic.config, clinic.urdf, "u", ("yaw", "reach"))
+        estimator = make_estimator(clinic.config, clinic.urdf, "u", ("yaw", "reach"), method="refined")
         for t_ns in range(T - 45_000_000, T + 1, 15_000_000):
             estimator.add_encoder(clinic.encoder(truth, t_ns))
             for camera in ("r0", "r1"):

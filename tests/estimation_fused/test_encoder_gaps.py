@@ -57,7 +57,7 @@ def test_the_joints_variance_grows_while_rows_are_missing(step_ms: float) -> Non
 
 
 @RATES
-@pytest.mark.parametrize("back", [2, 5])
+@pytest.mark.parametrize("back", [1, 2, 5])
 def test_between_rows_with_four_missing_the_joints_are_less_certain(step_ms: float, back: int) -> None:
     link = Link(step_ms)
     for k in (*range(60), *range(64, 64 + back)):

@@ -37,11 +37,12 @@ def gh_in_m1(nominal_from_actual: Array) -> Array:
     return np.asarray(nominal_from_actual[:3, :3].T @ (gh - nominal_from_actual[:3, 3]))
 
 
+@pytest.mark.parametrize("at_s", [0.6, 1.0, 1.7, 2.5])
 @pytest.mark.parametrize("axis", [0, 1, 2])
-def test_a_large_sudden_turn_of_m1_leaves_the_gh_centre_where_it_is_in_it(axis: int) -> None:
+def test_a_large_sudden_turn_of_m1_leaves_the_gh_centre_where_it_is_in_it(axis: int, at_s: float) -> None:
     """To first order a turn by 20 degrees would leave it 17 mm away, and that would pass for a slide."""
     turned = turn(axis, 20.0)
-    trial = Trial(duration_s=3.1, drifts=(Drift("m1", turned, 2.5),))
+    trial = Trial(duration_s=at_s + 0.6, drifts=(Drift("m1", turned, at_s),))
     estimator = estimator_for(trial)
     assert isinstance(estimator, FusedEstimator)
     judged = run(trial, estimator)
@@ -52,7 +53,7 @@ def test_a_large_sudden_turn_of_m1_leaves_the_gh_centre_where_it_is_in_it(axis: 
     assert last is not None
     assert np.linalg.norm(last.m1.slide_m) < 2e-3
     assert np.allclose(np.degrees(last.m1.turn_rad), 20.0 * np.eye(3)[axis], atol=0.5)
-    assert rms_deg(judged, 2.7) < 0.5
+    assert rms_deg(judged, at_s + 0.2) < 0.5
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
@@ -72,10 +73,15 @@ def test_what_the_arm_does_while_m1_is_not_seen_is_no_jump(axis: int) -> None:
     assert judged[-1].estimate.status is Status.VALID
 
 
+@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("axis", [0, 2])
+@pytest.mark.parametrize("frames", [1, 3])
 @pytest.mark.parametrize("marker", ["m0", "m1"])
-def test_a_marker_seen_wrong_at_first_does_no_lasting_harm(marker: str) -> None:
+def test_a_marker_seen_wrong_at_first_does_no_lasting_harm(marker: str, frames: int, axis: int, seed: int) -> None:
     """The mirror solution of its plane, 30 degrees off: what comes after it is right, and no drift."""
-    trial = Trial(duration_s=1.5, latency_ms=(20.0, 20.0), spoil=spoilt(marker, range(1), lambda T: T @ MIRRORED))
+    trial = Trial(
+        duration_s=1.5, seed=seed, latency_ms=(20.0, 20.0), spoil=spoilt(marker, range(frames), lambda T: T @ turn(axis, 30.0))
+    )
     estimator = estimator_for(trial)
     judged = run(trial, estimator)
     assert f"{marker}_jump" not in estimator.counts()

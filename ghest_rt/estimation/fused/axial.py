@@ -14,7 +14,7 @@ import numpy as np
 from ghest_rt.estimation.fused.reference import Reference
 from ghest_rt.estimation.fused.settled import Settled
 from ghest_rt.estimation.fused.tuning import Tuning
-from ghest_rt.geometry.so3 import Array, quat_wxyz_from_matrix
+from ghest_rt.geometry.so3 import Array, quat_wxyz
 
 # Less than this of the forearm across the arm (a sine) says nothing about the arm's axial rotation.
 _LEAST_SINE = 0.3
@@ -139,7 +139,7 @@ class AxialJudge:
 
 def twist_rad(gh_from_arm: Array) -> float:
     """Return the axial rotation of the arm against the neutral posture (swing-twist), -pi to pi."""
-    w, _, _, z = quat_wxyz_from_matrix(gh_from_arm).tolist()
+    w, _, _, z = quat_wxyz(gh_from_arm)
     return 2.0 * math.atan2(z, w)
 
 

@@ -32,7 +32,7 @@ class Streak:
         count: How many alike.
         length: How many in a row, alike or not.
         since_ns: Capture time of the first of those alike.
-        residual: (6,) innovation of the first of those alike: rotation rad, position m, E axes.
+        residual: (6,) innovation of the first of those alike: rotation rad, position m, axes of the marker.
     """
 
     count: int = 0

@@ -9,6 +9,7 @@ import numpy as np
 from ghest_rt.estimation.fused.belief import ACROMION, ARM, GH, POSES, Base, Belief
 from ghest_rt.estimation.fused.reference import NO_EVIDENCE, Evidence
 from ghest_rt.estimation.fused.tuning import Tuning
+from ghest_rt.geometry.se3 import transform
 from ghest_rt.geometry.so3 import Array, exp_so3, log_so3, skew
 
 # The drift of both markers and the arm length, in this order.
@@ -92,7 +93,8 @@ class DriftJudge:
         kinds = np.array(list(itertools.product((0, 1), (0, 1), (0, 1, 2), (0, 1, 2))))
         self._moved = kinds > 0
         self._since = kinds == _SINCE
-        self._turned = kinds[:, 3] == _EVER
+        self._turned = (kinds[:, 3] == _EVER).astype(float)
+        self._of_marker = [self._moved[:, part].any(axis=1).astype(float) for part in (slice(0, 2), slice(2, 4))]
         self._ever = (kinds[:, 2:] == _EVER).any(axis=1)
         self._came = self._since.any(axis=1)
         self._m1_moved = self._moved[:, 2:].any(axis=1)
@@ -152,13 +154,9 @@ class DriftJudge:
         P[_TOLD, _TOLD] = np.diag(variance)
         weights = self._weigh(belief.t_ns, P[_FOUND, _FOUND], explained, found, elbow_known=elbow_moved is not None)
         kept = np.flatnonzero(weights)
-        means, covariances = zip(*(self._posture(belief, P, explained, int(h), found) for h in kept), strict=True)
-        mean = np.sum([weights[h] * m for h, m in zip(kept, means, strict=True)], axis=0)
-        covariance = np.zeros((_POSTURE + DRIFT_SIZE, _POSTURE + DRIFT_SIZE))
-        for h, m, part in zip(kept, means, covariances, strict=True):
-            apart = m - mean
-            covariance += weights[h] * (part + np.outer(apart, apart))
-        covariance += self._doubt_of(belief, P, explained, found, mean)
+        postures = [self._posture(belief, P, explained, int(h), found) for h in kept]
+        mean, covariance = postures[0] if len(postures) == 1 else _mixture(weights[kept], postures)
+        covariance = covariance + self._doubt_of(belief, P, explained, found, mean)
         return self._compose(belief, explained, mean, covariance, weights)
 
     def _doubt_of(self, belief: Belief, P: Array, explained: "_Explained", found: Array, mean: Array) -> Array:
@@ -267,17 +265,14 @@ class DriftJudge:
     def _compose(self, belief: Belief, explained: "_Explained", mean: Array, covariance: Array, weights: Array) -> Posture:
         drift = mean[_POSTURE:]
         m0, m1 = (R @ base.turn.T for R, base in zip(belief.e_from_marker, belief.base, strict=True))
-        e_from_gh, e_from_elw = np.eye(4), np.eye(4)
-        e_from_gh[:3, :3] = exp_so3(mean[ACROMION]) @ m0 @ self._m0_from_gh[:3, :3]
-        e_from_gh[:3, 3] = belief.p_gh + mean[GH]
-        e_from_elw[:3, :3] = exp_so3(mean[ARM]) @ m1 @ self._m1_from_elw[:3, :3]
-        e_from_elw[:3, 3] = e_from_gh[:3, 3] - (explained.length_m + float(drift[LENGTH])) * e_from_elw[:3, 1]
+        p_gh = belief.p_gh + mean[GH]
+        e_from_gh = transform(exp_so3(mean[ACROMION]) @ m0 @ self._m0_from_gh[:3, :3], p_gh)
+        R_elw = exp_so3(mean[ARM]) @ m1 @ self._m1_from_elw[:3, :3]
+        e_from_elw = transform(R_elw, p_gh - (explained.length_m + float(drift[LENGTH])) * R_elw[:, 1])
         slides = [base.slide + drift[SLIDE[k]] for k, base in enumerate(belief.base)]
         turns = [_turned(base, drift[TURN[k]]) for k, base in enumerate(belief.base)]
         drifted = [
-            1.0
-            if base.jumped and not _is_back(slides[k], turns[k])
-            else float(weights[self._moved[:, 2 * k] | self._moved[:, 2 * k + 1]].sum())
+            1.0 if base.jumped and not _is_back(slides[k], turns[k]) else float(self._of_marker[k] @ weights)
             for k, base in enumerate(belief.base)
         ]
         return Posture(
@@ -287,7 +282,7 @@ class DriftJudge:
             (slides[0], slides[1]),
             (turns[0], turns[1]),
             (drifted[0], drifted[1]),
-            float(weights[self._turned].sum()),
+            float(self._turned @ weights),
         )
 
 
@@ -295,6 +290,14 @@ def _evidence(S: Array, found: Array) -> Array:
     """Return -2 log N(found; 0, S) of each of the (h, n, n) covariances, but for a constant."""
     solved = np.linalg.solve(S, np.broadcast_to(found[:, None], (len(S), len(found), 1)))[:, :, 0]
     return np.asarray(solved @ found + np.linalg.slogdet(S)[1])
+
+
+def _mixture(weights: Array, parts: list[tuple[Array, Array]]) -> tuple[Array, Array]:
+    """Return mean and covariance of a mixture of (mean, covariance)."""
+    mean = np.asarray(sum(w * m for w, (m, _) in zip(weights, parts, strict=True)))
+    apart = [m - mean for m, _ in parts]
+    spread = (w * (part + np.outer(d, d)) for w, (_, part), d in zip(weights, parts, apart, strict=True))
+    return mean, np.asarray(sum(spread))
 
 
 def _total(cost: Array) -> float:

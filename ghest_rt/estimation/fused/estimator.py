@@ -166,7 +166,7 @@ class FusedEstimator:
         drift = drift_report(posture, slip, self._chain.m1_from_elw[:3, 1])
         elbow = self._chain.elbow_angles(e_from_arm, joints.positions, of_arm)
         flagged = drift.m0.flagged or drift.m1.flagged
-        unsettled = belief.slack > _SETTLED_SLACK or math.sqrt(float(np.trace(covariance))) > self._unsettled_rad
+        unsettled = belief.slack > _SETTLED_SLACK or math.sqrt(float(covariance.trace())) > self._unsettled_rad
         bridged = bool(stale) or self._freshness.returning() or encoders_overdue(joints.gap_ns)
         reason = self._weakness(gh_from_arm, covariance, bridged, flagged and unsettled)
         return GhEstimate(
@@ -193,8 +193,9 @@ class FusedEstimator:
         covariance = covariance_in_e(covariance, e_from_camera)
         if self._chain.needs_encoders(observation.camera):
             turn, place = self._encoder_variance(joints)
-            covariance[[0, 1, 2], [0, 1, 2]] += self._tuning.encoder_rad**2 + turn
-            covariance[[3, 4, 5], [3, 4, 5]] += self._tuning.encoder_m**2 + place
+            diagonal = covariance.ravel()[::7]
+            diagonal[:3] += self._tuning.encoder_rad**2 + turn
+            diagonal[3:] += self._tuning.encoder_m**2 + place
         return Sighting(
             marker=which,
             t_ns=observation.t_capture_ns,

@@ -107,11 +107,13 @@ class FusedFilter:
         update = self._surged(foretold, belief.P, innovation, sighting)
         outcome = Outcome.TAKEN
         if not update.nis <= self._tuning.gate:
-            streak = _streak(belief.streaks[which], sighting.t_ns, innovation.residual)
+            in_marker = (innovation.residual.reshape(2, 3) @ belief.e_from_marker[which]).ravel()
+            streak = _streak(belief.streaks[which], sighting.t_ns, in_marker)
             belief.streaks = _with(belief.streaks, which, streak)
-            if self._has_jumped(belief, streak, update, sighting.t_ns):
-                if belief.taken[which] < _BELIEVED:
-                    return Outcome.MISTAKEN
+            jumped = self._has_jumped(belief, streak, update, sighting.t_ns)
+            if belief.taken[which] < _BELIEVED and streak.length >= self._tuning.jump_count:
+                return Outcome.MISTAKEN
+            if jumped:
                 outcome = Outcome.JUMP
                 moved = _moved_base(belief, which, sighting.pose, foretold.spread)
                 belief.base = _with(belief.base, which, moved)

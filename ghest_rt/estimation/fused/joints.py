@@ -16,10 +16,10 @@ _CURVED_S = 0.020
 # Samples nearer together or farther apart than this give no rate.
 _LEAST_STEP_NS = 4_000_000
 _MOST_STEP_NS = 60_000_000
-# Samples that the two parabolas are fitted to: as many as it takes, and more of them where encoders are coarse.
-_FITTED = (3, 7)
+# A parabola needs as many samples; the other one is fitted to more, for coarse encoders.
+_LEAST_SAMPLES, _FITTED = 3, 7
 # Lines: shares of the rate over the last step, and over the last two, that go on. Recorded movement of people is jerky.
-_SHARES, _SHARES_OF_TWO = (0.0, 0.5, 1.0), (0.5, 1.0)
+_SHARES, _SHARES_OF_TWO = np.array([[0.0], [0.5], [1.0]]), np.array([[0.5], [1.0]])
 # Share of the newest sample in what is known of a forecast's errors.
 _FOLLOW = 0.04
 # Keeps the weights of forecasts without any error finite, rad^2.
@@ -67,7 +67,7 @@ class JointForecast:
         """
         self._encoders = encoders
         self._max_gap_ns = max_gap_ns
-        self._last: deque[EncoderSample] = deque(maxlen=max(_FITTED))
+        self._last: deque[EncoderSample] = deque(maxlen=_FITTED)
         self._step_s = 0.0
         # How long the encoders were silent before samples that do not suffice for a forecast yet.
         self._gap_ns = 0
@@ -90,11 +90,13 @@ class JointForecast:
             last.clear()
             self._gap_ns = step_ns
         elif last:
-            self._step_s = step_ns * 1e-9
-            if self._forecasts is not None:
-                self._judge(sample, self._step_s)
+            step_s = step_ns * 1e-9
+            if self._forecasts is not None and step_s <= _USUAL_STEPS * (self._step_s or step_s):
+                self._judge(sample, step_s)
+            # Rows that are missing make no slower link.
+            self._step_s = min(step_s, 1.1 * self._step_s) if self._step_s else step_s
         last.append(sample)
-        self._forecasts = _forecasts(last) if len(last) >= min(_FITTED) else None
+        self._forecasts = _forecasts(last) if len(last) >= _LEAST_SAMPLES else None
         self._mean = self._weighted()
         if self._mean is not None:
             self._gap_ns = 0
@@ -175,26 +177,26 @@ def _on(forecast: Array, ahead_s: float) -> Array:
 def _forecasts(last: deque[EncoderSample]) -> Array:
     """Return the (7, 3, n) competing forecasts: position, rate, half the acceleration at the newest sample."""
     newest, before, earlier = last[-1], last[-2], last[-3]
-    found = np.zeros((len(_FITTED) + len(_SHARES) + len(_SHARES_OF_TWO), 3, len(newest.angles_rad)))
-    for k, count in enumerate(_FITTED):
-        found[k] = _parabola(last, count)
-    lines = found[len(_FITTED) :]
-    lines[:, 0] = newest.angles_rad
-    rate = (newest.angles_rad - before.angles_rad) * (1e9 / (newest.t_capture_ns - before.t_capture_ns))
-    lines[: len(_SHARES), 1] = np.outer(_SHARES, rate)
-    rate = (newest.angles_rad - earlier.angles_rad) * (1e9 / (newest.t_capture_ns - earlier.t_capture_ns))
-    lines[len(_SHARES) :, 1] = np.outer(_SHARES_OF_TWO, rate)
+    ago_s, ago_2_s = ((sample.t_capture_ns - newest.t_capture_ns) * 1e-9 for sample in (before, earlier))
+    rate = (before.angles_rad - newest.angles_rad) / ago_s
+    rate_of_two = (earlier.angles_rad - newest.angles_rad) / ago_2_s
+    found = np.zeros((2 + len(_SHARES) + len(_SHARES_OF_TWO), 3, len(newest.angles_rad)))
+    found[:, 0] = newest.angles_rad
+    bend = (rate_of_two - rate) / (ago_2_s - ago_s)
+    found[0, 1], found[0, 2] = rate - ago_s * bend, bend
+    found[1] = _parabola(last)
+    lines = found[2:, 1]
+    lines[: len(_SHARES)] = _SHARES * rate
+    lines[len(_SHARES) :] = _SHARES_OF_TWO * rate_of_two
     return found
 
 
-def _parabola(samples: deque[EncoderSample], count: int) -> Array:
-    """Return the (3, n) parabola fitted to the last `count` samples: position, rate, half the acceleration at the newest."""
-    chosen = [samples[k] for k in range(max(len(samples) - count, 0), len(samples))]
-    newest_ns = chosen[-1].t_capture_ns
-    t = np.array([(sample.t_capture_ns - newest_ns) * 1e-9 for sample in chosen])
-    A = np.array([np.ones(len(chosen)), t, t * t])
+def _parabola(samples: deque[EncoderSample]) -> Array:
+    """Return the (3, n) parabola fitted to all the samples: position, rate, half the acceleration at the newest."""
+    newest_ns = samples[-1].t_capture_ns
+    t = np.array([(sample.t_capture_ns - newest_ns) * 1e-9 for sample in samples])
+    A = np.array([np.ones(len(samples)), t, t * t])
     # Times in units of the span, so that the normal matrix is well scaled.
-    scale = np.array([1.0, -1.0 / t[0], 1.0 / (t[0] * t[0])])
-    A = scale[:, None] * A
-    fitted = inverse_3(A @ A.T) @ (A @ np.array([sample.angles_rad for sample in chosen]))
-    return np.asarray(scale[:, None] * fitted)
+    scale = np.array([[1.0], [-1.0 / t[0]], [1.0 / (t[0] * t[0])]])
+    A *= scale
+    return np.asarray(scale * (inverse_3(A @ A.T) @ (A @ np.array([sample.angles_rad for sample in samples]))))

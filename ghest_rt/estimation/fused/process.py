@@ -6,7 +6,7 @@ import numpy as np
 
 from ghest_rt.estimation.fused.belief import ACROMION, ARM, BOTH_GH, GH, GH_IN_MARKER, GH_RATE, POSES, RATES, SIZE, Belief
 from ghest_rt.estimation.fused.tuning import Tuning
-from ghest_rt.geometry.so3 import Array, exp_so3, quat_wxyz_from_matrix, skew
+from ghest_rt.geometry.so3 import Array, exp_so3, quat_wxyz, skew
 
 # A marker not seen for this long is bridged: its body may do what it has not done before.
 _UNSEEN_NS = 80_000_000
@@ -128,7 +128,7 @@ def follow_encoders(belief: Belief, upper_arm: Array, p_gh: Array, e_from_r1: Ar
     # Shortest rotation from V to W: I + [c]x + [c]x^2 / (1 + V.W), c = V x W.
     C = skew(np.array([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx]))
     swing = _EYE_3 + C + C @ C / max(1.0 + ax * bx + ay * by + az * bz, _LEAST)
-    w, x, y, z = quat_wxyz_from_matrix(moved).tolist()
+    w, x, y, z = quat_wxyz(moved)
     twist = 2.0 * math.atan2(x * ax + y * ay + z * az, w)
     follow = np.asarray(swing @ exp_so3(np.array([twist * ax, twist * ay, twist * az])))
     return follow, 2.0 * math.atan2(math.sqrt(x * x + y * y + z * z), w)
