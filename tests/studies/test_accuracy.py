@@ -17,7 +17,7 @@ from ghest_rt.errors import BadInputError
 from ghest_rt.studies.accuracy.summary import checks, confidence_interval, table
 from ghest_rt.studies.figures.accuracy import draw_figure_13
 from ghest_rt.studies.paper_values import ACCURACY, MEAN, MOVEMENTS
-from ghest_rt.studies.session.errors import QUANTITIES
+from ghest_rt.studies.session.errors import POSE_QUANTITIES
 
 BOX = {"whislo": 0.5e-3, "q1": 0.8e-3, "med": 1e-3, "q3": 1.2e-3, "whishi": 2e-3}
 
@@ -37,7 +37,7 @@ def made_up(rms: dict[tuple[str, str], float], seeds: int = 2) -> list[dict[str,
         }
         for seed in range(seeds)
         for movement in MOVEMENTS
-        for quantity in QUANTITIES
+        for quantity in POSE_QUANTITIES
     ]
 
 

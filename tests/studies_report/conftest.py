@@ -20,9 +20,9 @@ from ghest_rt.studies.latency.study import LatencySettings, latency
 from ghest_rt.studies.latency.tasks import CANDIDATES
 from ghest_rt.studies.movements import METHODS, Movements
 from ghest_rt.studies.results import write_study
-from ghest_rt.studies.rivals.angle_errors import QUANTITIES as ANGLE_QUANTITIES
+from ghest_rt.studies.rivals.angle_errors import ANGLE_QUANTITIES
 from ghest_rt.studies.rivals.contenders import CONTENDERS
-from ghest_rt.studies.session.errors import QUANTITIES
+from ghest_rt.studies.session.errors import POSE_QUANTITIES
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,7 @@ def accuracy_summary() -> dict[str, object]:
             "valid_fraction": 0.875,
         }
         for method in METHODS
-        for quantity in QUANTITIES
+        for quantity in POSE_QUANTITIES
         for m in ("SAbAd", "SFE", "SIR", "COMB")
         for seed in (1, 2)
     ]

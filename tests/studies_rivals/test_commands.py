@@ -10,8 +10,11 @@ from typer.testing import CliRunner
 from ghest_rt.cli.main import app
 from ghest_rt.errors import BadInputError
 from ghest_rt.studies.accuracy import study as accuracy_study
+from ghest_rt.studies.latency.tasks import judge_speed
 from ghest_rt.studies.movements import Movements
+from ghest_rt.studies.observing.scenario import Scenario, motion_file
 from ghest_rt.studies.rivals.contenders import CONTENDERS
+from ghest_rt.studies.rivals.tasks import answer_with_aruco
 from ghest_rt.studies.sensitivity import sobol as sensitivity_sobol
 
 
@@ -63,6 +66,19 @@ def test_a_motion_file_that_is_not_there_is_named(tmp_path: Path) -> None:
     result = CliRunner().invoke(app, ["study", "compare", "--motion", str(tmp_path / "no.mot"), "--out", str(tmp_path)])
     assert result.exit_code != 0
     assert "no.mot" in str(result.exception)
+
+
+def test_a_motion_file_that_has_changed_is_refused_by_every_task(tmp_path: Path) -> None:
+    path = tmp_path / "a.mot"
+    path.write_text("x")
+    scenario = Scenario(motion=motion_file(path))
+    path.write_text("y")
+    for task in (answer_with_aruco, judge_speed):
+        parameters = scenario.model_dump(mode="json")
+        if task is judge_speed:
+            parameters = {"scenario": parameters, "factor": 1.0, "span_s": 1.0}
+        with pytest.raises(BadInputError, match="has changed since the study began"):
+            task(parameters, ())
 
 
 def test_a_movement_named_twice_is_played_once(tmp_path: Path) -> None:

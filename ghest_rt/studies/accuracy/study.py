@@ -8,7 +8,7 @@ from ghest_rt.studies.engine.run import Executor, Progress, run_tasks, spent_cpu
 from ghest_rt.studies.engine.store import ResultStore
 from ghest_rt.studies.movements import METHODS, Movements, frames_of
 from ghest_rt.studies.observing.scenario import Scenario, SensorName
-from ghest_rt.studies.session.errors import QUANTITIES, STATISTICS
+from ghest_rt.studies.session.errors import POSE_QUANTITIES, STATISTICS
 from ghest_rt.studies.session.tasks import judge_task
 from ghest_rt.vision.station import Method
 
@@ -73,7 +73,7 @@ def _rows(scenario: Scenario, method: Method, found: dict[str, Any]) -> list[Row
             "judged": found["judged"],
             "valid_fraction": found["valid_fraction"],
         }
-        for quantity in QUANTITIES
+        for quantity in POSE_QUANTITIES
     ]
 
 

@@ -11,7 +11,7 @@ from ghest_rt.studies.accuracy.study import AccuracyPlan, Row, select
 from ghest_rt.studies.checks import Check
 from ghest_rt.studies.numbers import finite
 from ghest_rt.studies.paper_values import ACCURACY, MEAN, MOVEMENTS
-from ghest_rt.studies.session.errors import QUANTITIES
+from ghest_rt.studies.session.errors import POSE_QUANTITIES
 
 MEAN_OF_MOVEMENTS = "mean"
 _CONFIDENCE = 0.95
@@ -41,7 +41,7 @@ def table(rows: Sequence[Row]) -> list[Row]:
     movements = list(dict.fromkeys(cast(str, row["movement"]) for row in rows))
     for sensor in dict.fromkeys(row["sensor"] for row in rows):
         for method in dict.fromkeys(row["method"] for row in rows):
-            for quantity in QUANTITIES:
+            for quantity in POSE_QUANTITIES:
                 chosen = [select(rows, sensor=sensor, method=method, quantity=quantity, movement=m) for m in movements]
                 rms, sd, valid = ([_by_seed(of, column) for of in chosen] for column in ("rms", "sd", "valid_fraction"))
                 whole = [*zip(movements, rms, sd, valid, strict=True)]
@@ -84,7 +84,7 @@ def confidence_interval(values: Array) -> tuple[float | None, float | None]:
 def checks(entries: Sequence[Row]) -> list[Check]:
     """Put the paper's statements on accuracy to the test, for method `paper` with the paper's sensor and movements."""
     rms = _of_method(entries, "paper")
-    if not all((quantity, movement) in rms for quantity in QUANTITIES for movement in MOVEMENTS):
+    if not all((quantity, movement) in rms for quantity in POSE_QUANTITIES for movement in MOVEMENTS):
         return []
     return [_m1_is_worse(rms, _of_method(entries, "refined")), *_comb_is_worst(rms)]
 

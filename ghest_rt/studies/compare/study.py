@@ -12,7 +12,7 @@ from ghest_rt.studies.engine.store import ResultStore
 from ghest_rt.studies.movements import METHODS, Movements, frames_of
 from ghest_rt.studies.numbers import plain
 from ghest_rt.studies.observing.scenario import Scenario, SensorName
-from ghest_rt.studies.rivals.angle_errors import QUANTITIES
+from ghest_rt.studies.rivals.angle_errors import ANGLE_QUANTITIES
 from ghest_rt.studies.rivals.contenders import CONTENDERS
 from ghest_rt.studies.rivals.running import REST_S
 from ghest_rt.studies.rivals.tasks import compare_task
@@ -119,7 +119,7 @@ def _means(rows: Sequence[Row], key: str) -> list[Row]:
 
 
 def _mean(rows: Sequence[Row]) -> Row:
-    return {name: mean_of(rows, name) for name in (*QUANTITIES, "answered_fraction")}
+    return {name: mean_of(rows, name) for name in (*ANGLE_QUANTITIES, "answered_fraction")}
 
 
 def mean_of(rows: Sequence[Mapping[str, object]], name: str) -> float:
@@ -141,8 +141,8 @@ def _verdicts(rows: Sequence[Row]) -> list[Row]:
         for key, who in CONTENDERS.items():
             if key != "fused":
                 mine = of[key]
-                theirs = {name: mean_of(mine, f"common_{name}") for name in QUANTITIES}
-                fused = {name: mean_of(mine, f"fused_common_{name}") for name in QUANTITIES}
+                theirs = {name: mean_of(mine, f"common_{name}") for name in ANGLE_QUANTITIES}
+                fused = {name: mean_of(mine, f"fused_common_{name}") for name in ANGLE_QUANTITIES}
                 said = verdict(
                     who,
                     {**theirs, "answered_fraction": mean_of(mine, "answered_fraction")},

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from statistics import median
 
 import numpy as np
@@ -14,11 +13,8 @@ from ghest_rt.estimation.pipeline import lag_ns_of
 from ghest_rt.geometry.so3 import angle_between_rad
 from ghest_rt.messages.results import GhEstimate
 from ghest_rt.simulation.anatomy import anatomy
-from ghest_rt.simulation.opensim_file import read_motion_table
-from ghest_rt.simulation.opensim_motion import OpenSimMotion
 from ghest_rt.simulation.posture import Motion, Posture
 from ghest_rt.simulation.sensors import find_sensors
-from ghest_rt.simulation.therapy import TherapyMotion, find_movement
 from ghest_rt.simulation.world import World
 from ghest_rt.studies.engine.task import Result, Task
 from ghest_rt.studies.observing.observed import Observed, observe
@@ -131,7 +127,7 @@ def _without_lag(station: LoadedStation) -> LoadedStation:
 
 
 def _world(scenario: Scenario, factor: float, span_s: float) -> World:
-    motion = _motion(scenario)
+    motion = scenario.performed()
     span_s = min(span_s, motion.duration_s - 2 * _MARGIN_S)
     if not span_s > 0:
         raise BadInputError(f"{scenario.name}: {motion.duration_s:g} s are too short to be played at other speeds")
@@ -144,10 +140,3 @@ def _world(scenario: Scenario, factor: float, span_s: float) -> World:
         find_sensors(scenario.sensor),
         seed=scenario.seed,
     )
-
-
-def _motion(scenario: Scenario) -> Motion:
-    if scenario.motion is not None:
-        path = Path(scenario.motion.path)
-        return OpenSimMotion(read_motion_table(path), path.stem)
-    return TherapyMotion(find_movement(scenario.name), scenario.seed)

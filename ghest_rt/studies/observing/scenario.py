@@ -10,8 +10,11 @@ from ghest_rt.config.strict import Strict
 from ghest_rt.errors import BadInputError
 from ghest_rt.simulation.command import SimulateOptions, build_world
 from ghest_rt.simulation.disturbances import SoftTissueName, parse_shift, parse_turn
+from ghest_rt.simulation.opensim_file import read_motion_table
+from ghest_rt.simulation.opensim_motion import OpenSimMotion
+from ghest_rt.simulation.posture import Motion
 from ghest_rt.simulation.texture import MarkerTexture
-from ghest_rt.simulation.therapy import find_movement
+from ghest_rt.simulation.therapy import TherapyMotion, find_movement
 from ghest_rt.simulation.world import World
 from ghest_rt.vision.station import Method
 
@@ -74,6 +77,18 @@ class Scenario(Strict):
         """Return the session with every marker where the calibration says, and nothing told wrongly."""
         return self.as_seen().model_copy(update={"shifts": (), "turns": (), "soft_tissue": "none"})
 
+    def performed(self) -> Motion:
+        """Return what the patient does, the whole of it.
+
+        Raises:
+            BadInputError: The movement is unknown, or the motion file cannot be used or is not what it was.
+        """
+        self._check_file()
+        if self.motion is None:
+            return TherapyMotion(find_movement(self.movement or ""), self.seed)
+        path = Path(self.motion.path)
+        return OpenSimMotion(read_motion_table(path), path.stem)
+
     def world(self, marker: MarkerTexture = "disks") -> World:
         """Set up the simulated clinic.
 
@@ -83,8 +98,7 @@ class Scenario(Strict):
         Raises:
             BadInputError: A part of the scenario cannot be used, or the motion file is not what it was.
         """
-        if self.motion is not None and motion_file(Path(self.motion.path)) != self.motion:
-            raise BadInputError(f"{self.motion.path}: the file has changed since the study began; start the study again")
+        self._check_file()
         return build_world(
             SimulateOptions(
                 out=Path(),
@@ -99,6 +113,10 @@ class Scenario(Strict):
                 marker=marker,
             )
         )
+
+    def _check_file(self) -> None:
+        if self.motion is not None and motion_file(Path(self.motion.path)) != self.motion:
+            raise BadInputError(f"{self.motion.path}: the file has changed since the study began; start the study again")
 
 
 def motion_file(path: Path) -> MotionFile:

@@ -12,7 +12,7 @@ from ghest_rt.messages.results import GhEstimate, TruthSample
 from ghest_rt.studies.truth import TruthTrack
 
 ANGLES = ("flexion_deg", "abduction_deg", "rotation_deg")
-QUANTITIES = ("orientation_deg", "published_deg", *ANGLES, "plane_deg")
+ANGLE_QUANTITIES = ("orientation_deg", "published_deg", *ANGLES, "plane_deg")
 """What is judged: the rotation at the sample's own instant; the same when it is published, `lag` later; the clinical angles;
 the plane of shoulder, elbow and wrist (what the swivel angle tells)."""
 
@@ -42,20 +42,21 @@ class Answers:
 
 
 def error_columns(answers: Answers, truth: TruthTrack) -> dict[str, Array]:
-    """Return each of `QUANTITIES` at every instant, degrees: (n,), signed for the angles, NaN where there is nothing to judge.
+    """Return each of `ANGLE_QUANTITIES` at every instant, degrees.
 
-    Single angles are not judged where the true posture is within 10 degrees of their singularity.
+    Each is (n,), signed for the angles, NaN where there is nothing to judge. Single angles are not judged where the true
+    posture is within 10 degrees of their singularity.
     """
     rows = [
         _errors(rotation, truth.at(t_ns), truth.at(t_ns + answers.lag_ns))
         for t_ns, rotation in zip(answers.t_ns, answers.gh_from_arm, strict=True)
     ]
-    table = np.array(rows, dtype=np.float64).reshape(-1, len(QUANTITIES))
-    return {name: table[:, k] for k, name in enumerate(QUANTITIES)}
+    table = np.array(rows, dtype=np.float64).reshape(-1, len(ANGLE_QUANTITIES))
+    return {name: table[:, k] for k, name in enumerate(ANGLE_QUANTITIES)}
 
 
 def error_statistics(answers: Answers, truth: TruthTrack) -> dict[str, float | int]:
-    """Return the root mean square of each of `QUANTITIES`, the greatest orientation error, and how much was judged."""
+    """Return the root mean square of each of `ANGLE_QUANTITIES`, the greatest orientation error and how much was judged."""
     columns = error_columns(answers, truth)
     known = np.array([truth.at(t_ns) is not None for t_ns in answers.t_ns], dtype=bool)
     orientation = columns["orientation_deg"]
@@ -73,8 +74,8 @@ def on_common_instants(theirs: Answers, fused: Answers, truth: TruthTrack) -> di
     """Return what two contenders are off by where both have an answer, so that silence in hard moments wins nothing.
 
     Returns:
-        `common_fraction`, the share of the instants with truth at which both answered; for each of `QUANTITIES` its root mean
-        square there as `common_<quantity>` for the one and `fused_common_<quantity>` for the other.
+        `common_fraction`, the share of the instants with truth at which both answered; for each of `ANGLE_QUANTITIES` its root
+        mean square there as `common_<quantity>` for the one and `fused_common_<quantity>` for the other.
     """
     known = {t_ns for t_ns in theirs.t_ns if truth.at(t_ns) is not None}
     columns = error_columns(theirs, truth), error_columns(fused, truth)
@@ -82,7 +83,7 @@ def on_common_instants(theirs: Answers, fused: Answers, truth: TruthTrack) -> di
     shared = [(k, at[t_ns]) for k, t_ns in enumerate(theirs.t_ns) if t_ns in at]
     mine, others = ([pair[side] for pair in shared] for side in (0, 1))
     found: dict[str, float] = {}
-    for name in QUANTITIES:
+    for name in ANGLE_QUANTITIES:
         one, other = columns[0][name][mine], columns[1][name][others]
         both = np.isfinite(one) & np.isfinite(other)
         found[f"common_{name}"], found[f"fused_common_{name}"] = _rms(one[both]), _rms(other[both])
@@ -115,7 +116,7 @@ def simple_forecasts_deg(truth: TruthTrack, instants_ns: Sequence[int], period_n
 
 def _errors(rotation: Array | None, at: TruthSample | None, published: TruthSample | None) -> list[float]:
     if rotation is None or at is None:
-        return [math.nan] * len(QUANTITIES)
+        return [math.nan] * len(ANGLE_QUANTITIES)
     true = at.gh_from_arm
     late = math.nan if published is None else math.degrees(angle_between_rad(published.gh_from_arm, rotation))
     cosine = float(np.clip(rotation[:, 0] @ true[:, 0], -1.0, 1.0))

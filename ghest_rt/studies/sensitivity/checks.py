@@ -25,6 +25,8 @@ def checks(rows: Sequence[Row]) -> list[Check]:
     if set(MOVEMENTS) - {cast(str, r["movement"]) for r in shifts}:
         return []
     amounts = {cast(float, r["amount"]) for r in shifts} - {0.0}
+    if not amounts:
+        return []
     largest, smallest = max(amounts), min(amounts)
     refined = _Errors(_shifts(rows, "refined"), largest)
     statements: tuple[tuple[Callable[[_Errors], Check], float, tuple[str, ...]], ...] = (

@@ -14,7 +14,7 @@ from ghest_rt.studies.observing.tasks import observe_task
 from ghest_rt.studies.paper_values import STEP_M, STEPS
 from ghest_rt.studies.sensitivity.derivative import eq11_relative_sensitivity
 from ghest_rt.studies.sensitivity.parameters import Group, Parameter, further_parameters, paper_parameters
-from ghest_rt.studies.session.errors import QUANTITIES
+from ghest_rt.studies.session.errors import POSE_QUANTITIES
 from ghest_rt.studies.session.tasks import judge_task
 from ghest_rt.vision.station import Method
 
@@ -118,7 +118,7 @@ def _row(plan: SensitivityPlan, case: _Case, method: Method, result: dict[str, o
         "axis": case.parameter.axis,
         "amount": case.amount,
         "unit": case.parameter.unit,
-        **{f"{name}_rms": None if found[name] is None else found[name]["rms"] for name in QUANTITIES},
+        **{f"{name}_rms": None if found[name] is None else found[name]["rms"] for name in POSE_QUANTITIES},
         "samples": found["samples"],
         "valid_fraction": found["valid_fraction"],
         "S_position": None,

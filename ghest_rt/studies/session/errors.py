@@ -9,7 +9,7 @@ from ghest_rt.messages.results import GhEstimate, TruthSample
 from ghest_rt.studies.metrics import ErrorAccumulator
 from ghest_rt.studies.truth import TruthTrack
 
-QUANTITIES = ("m0_m", "m1_m", "position_m", "orientation_deg")
+POSE_QUANTITIES = ("m0_m", "m1_m", "position_m", "orientation_deg")
 """Position errors of markers m0 and m1 in E, position and orientation error of the arm in the m0 frame."""
 
 
@@ -17,13 +17,13 @@ STATISTICS = ("rms", "sd", "mean", "max", "whislo", "q1", "med", "q3", "whishi")
 """What is told of each of them."""
 
 
-def error_statistics(estimates: Iterable[GhEstimate], truth: Sequence[TruthSample]) -> dict[str, object]:
+def pose_error_statistics(estimates: Iterable[GhEstimate], truth: Sequence[TruthSample]) -> dict[str, object]:
     """Return the statistics of a run's errors.
 
     Returns:
-        `samples`, `judged`, `valid_fraction`, and for each of `QUANTITIES` its `rms`, `sd` (of the error's magnitude about its
-        mean, as in the parentheses of Tables 5 and 6), `mean`, `max` and the box plot's `whislo`, `q1`, `med`, `q3`, `whishi`
-        (quartiles; whiskers at the last error within 1.5 interquartile ranges). None where nothing could be judged.
+        `samples`, `judged`, `valid_fraction`, and for each of `POSE_QUANTITIES` its `rms`, `sd` (of the error's magnitude about
+        its mean, as in the parentheses of Tables 5 and 6), `mean`, `max` and the box plot's `whislo`, `q1`, `med`, `q3`,
+        `whishi` (quartiles; whiskers at the last error within 1.5 interquartile ranges). None where nothing could be judged.
     """
     track = TruthTrack.of(truth)
     accumulator = ErrorAccumulator()

@@ -7,7 +7,7 @@ from ghest_rt.studies.observing.observed import Observed, with_markers_of
 from ghest_rt.studies.observing.packing import unpack
 from ghest_rt.studies.observing.scenario import Scenario
 from ghest_rt.studies.observing.tasks import observe_task
-from ghest_rt.studies.session.errors import error_statistics
+from ghest_rt.studies.session.errors import pose_error_statistics
 from ghest_rt.studies.session.estimating import estimate_session
 
 _ESTIMATE_COST = 0.15
@@ -39,7 +39,7 @@ def judge_session(parameters: dict[str, object], needs: Sequence[Result]) -> Res
     session = _session(needs)
     return Result(
         {
-            method: error_statistics(
+            method: pose_error_statistics(
                 estimate_session(
                     session, method, mount_errors=scenario.mount_errors, encoder_bias_rad=scenario.encoder_bias_rad
                 ),
