@@ -61,7 +61,7 @@ def simulate(
     color_only: Annotated[bool, typer.Option("--color-only", metavar="", help="Cameras without depth")] = False,
     calibration_reference: Annotated[
         bool,
-        typer.Option("--calibration-reference", metavar="", help="Station file with \\[calibration.reference], an experiment"),
+        typer.Option("--calibration-reference", metavar="", help="Station file with \\[calibration.reference]"),
     ] = False,
     as_json: Json = False,
 ) -> None:
