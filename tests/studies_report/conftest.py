@@ -53,7 +53,7 @@ def _values(job: Job) -> dict[str, object]:
         }
         return {
             "duration_s": 1.0,
-            "inertial_after_rest_deg": 7.5,
+            "inertial_after_rest_deg": 8.5 if job.task.parameters["movement"] == "COMB" else 7.5,
             "girdle_turn_deg": 4.25,
             "hold_forecast_deg": 0.25,
             "straight_forecast_deg": 0.125,

@@ -80,6 +80,10 @@ def test_the_papers_values_stand_beside_ours(page: str) -> None:
     assert "SFE 3.9, SAA 3.3, SIER 6.5" in texts
 
 
+def test_the_inertial_sensors_drift_is_a_mean_over_all_sessions(page: str) -> None:
+    assert "after holding still for 120 s it is off by 8.00° (mean of 2 sessions, 7.50° to 8.50°)" in page
+
+
 def test_computing_times_come_from_the_clock(page: str) -> None:
     assert Page(page).texts.count("1.00, 1.00") == 4  # a clock that goes on by 1 ms whenever it is read
 

@@ -68,7 +68,7 @@ def _show(document: dict[str, Any], console: "Console") -> None:
     from ghest_rt.studies.numbers import number, percent
 
     shown = new_table(
-        "RMS errors, mean over seeds, ± half its 95 % confidence interval (Tables 5, 6)",
+        "RMS errors, mean over seeds, ± half its 95 % confidence interval",
         ("sensor: method", "movement"),
         (*_TITLES.values(), "valid\n%"),
     )

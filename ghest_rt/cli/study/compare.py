@@ -75,14 +75,18 @@ def _show(document: dict[str, Any], console: "Console") -> None:
         table = new_table(
             f"RMS errors in degrees, mean over {of_kind}, sensor {group['sensor']}",
             ("contender",),
-            (*_COLUMNS.values(), "answered\n%", "fused\nwins"),
+            (*_COLUMNS.values(), "fused\nwins"),
         )
         for who in contenders:
             row = who["measured"][k]
             won = tally(verdicts, who["key"], group["sensor"], group["kind"])
-            figures = (*(number(row[name]) for name in _COLUMNS), percent(row["answered_fraction"]))
+            figures = (number(row[name]) for name in _COLUMNS)
             table.add_row(who["title"], *figures, f"{won.own_instant}/{won.rows}" if won.rows else "")
         console.print(table)
+        shares = [(who["title"], who["measured"][k]["answered_fraction"]) for who in contenders]
+        seldom = [f"{title} {percent(share)} %" for title, share in shares if share < 1.0]
+        if seldom:
+            console.print(f"Not answered at every instant: {', '.join(seldom)}", markup=False, highlight=False)
     console.print(
         "publ.: judged at the instant of publishing; fused wins: movements in which it is nearer in all other columns"
     )

@@ -16,6 +16,8 @@ from ghest_rt.studies.engine.local import LocalExecutor
 from ghest_rt.studies.engine.run import Executor
 from ghest_rt.studies.engine.store import ResultStore
 
+_NUMBER_WIDTH = 6
+
 
 def opened(out: Path, workers: int | None, scheduler: str | None) -> tuple[ResultStore, Executor]:
     """Return where tasks' results are kept, below the results folder and common to all studies in it, and what runs the tasks.
@@ -67,12 +69,12 @@ def finish(document: dict[str, Any], out: Path, as_json: bool, show: Callable[[d
 
 
 def new_table(title: str, texts: Sequence[str], numbers: Sequence[str]) -> Table:
-    """Return an empty table: columns of texts first, then columns of numbers."""
-    table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
+    """Return an empty table: columns of texts first, then columns of numbers, whose titles wrap where there is little room."""
+    table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False, collapse_padding=True)
     for column in texts:
         table.add_column(column, no_wrap=True)
     for column in numbers:
-        table.add_column(column, justify="right", no_wrap=True)
+        table.add_column(column, justify="right", min_width=_NUMBER_WIDTH)
     return table
 
 
