@@ -16,6 +16,10 @@ METHODS: tuple[Method, ...] = ("paper", "refined", "fused")
 """The methods that studies compare unless told otherwise."""
 
 
+MEAN_OF_MOVEMENTS = "mean"
+"""What stands in place of a movement's name for the mean of all."""
+
+
 @dataclass(frozen=True, slots=True)
 class Movements:
     """What the simulated patient does in a study.
@@ -54,7 +58,7 @@ def _once(motions: Sequence[Path]) -> list[Path]:
     """Return every file once; movements are told apart by the files' names without ending.
 
     Raises:
-        BadInputError: Two files would be one movement, or one has the name of a movement of Table 2.
+        BadInputError: Two files would be one movement, or one has a name that results use otherwise.
     """
     files = {path.resolve(): path for path in reversed(motions)}
     named: dict[str, Path] = {}
@@ -62,6 +66,8 @@ def _once(motions: Sequence[Path]) -> list[Path]:
         name = path.stem.lower()
         if name in {movement.lower() for movement in MOVEMENTS}:
             raise BadInputError(f"--motion {path}: {path.stem} is a movement of Table 2; give the file another name")
+        if name == MEAN_OF_MOVEMENTS:
+            raise BadInputError(f"--motion {path}: tables call the mean of all movements so; give the file another name")
         if name in named:
             raise BadInputError(
                 f"--motion {path}: {named[name]} has the same name, and results tell movements apart by it; rename one of them"

@@ -89,7 +89,10 @@ def test_a_movement_named_twice_is_played_once(tmp_path: Path) -> None:
     assert [scenario.name for scenario in twice.scenarios("paper", 1, ("paper",))] == ["SFE", "COMB", "a"]
 
 
-@pytest.mark.parametrize(("name", "message"), [("a.mot", "the same name.*rename one"), ("Comb.mot", "movement of Table 2")])
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [("a.mot", "the same name.*rename one"), ("Comb.mot", "movement of Table 2"), ("mean.mot", "another name")],
+)
 def test_movements_that_could_be_taken_for_one_another_are_refused(tmp_path: Path, name: str, message: str) -> None:
     (tmp_path / "sub").mkdir()
     files = tmp_path / "a.mot", tmp_path / "sub" / name

@@ -9,11 +9,11 @@ import numpy as np
 from ghest_rt.geometry.so3 import Array
 from ghest_rt.studies.accuracy.study import AccuracyPlan, Row, select
 from ghest_rt.studies.checks import Check
+from ghest_rt.studies.movements import MEAN_OF_MOVEMENTS
 from ghest_rt.studies.numbers import finite
 from ghest_rt.studies.paper_values import ACCURACY, MEAN, MOVEMENTS
 from ghest_rt.studies.session.errors import POSE_QUANTITIES
 
-MEAN_OF_MOVEMENTS = "mean"
 _CONFIDENCE = 0.95
 
 
