@@ -62,13 +62,13 @@ def _table(entries: list[Row], sensor: str, title: str, quantities: tuple[tuple[
             cells += [Cell(_with_interval(found[m], scale), "ours" if m == "fused" else "number") for m in methods]
         rows.append(tuple(cells))
         valid = {e["method"]: e["valid_fraction"] for e in here if e["movement"] == movement}
-        rows[-1] += tuple(Cell(percent(valid[m])) for m in methods)
+        rows[-1] += (Cell(", ".join(percent(valid[m]) for m in methods)),)
     columns = (("as published",) if published else ()) + tuple(methods)
     return Table(
         title=f"{title}, sensor {sensor}",
-        head=("movement", *columns * len(quantities), *methods),
+        head=("movement", *columns * len(quantities), ", ".join(methods)),
         rows=tuple(rows),
-        groups=(("", 1), *((name, len(columns)) for _, name, _ in quantities), ("valid (%)", len(methods))),
+        groups=(("", 1), *((name, len(columns)) for _, name, _ in quantities), ("valid (%)", 1)),
     )
 
 
