@@ -185,7 +185,7 @@ def draw_sobol(rows: Sequence[Row], movement: str, samples: int) -> Any:
     """Return the Sobol indices of one movement, position and orientation side by side, with 95 % confidence intervals."""
     chosen = [r for r in rows if r["movement"] == movement]
     figure = new_figure(7.2, 5.8)
-    panels = figure.subplots(1, 2, sharey=True)
+    panels = figure.subplots(1, 2, sharey=True, sharex=True)
     for axes, (output, title) in zip(
         panels, (("position_m", "position error"), ("orientation_deg", "orientation error")), strict=True
     ):

@@ -39,7 +39,7 @@ def compare_section(summary: Row, folder: Path) -> Section:
             " the start); nobody sees the truth after that. Errors are root mean squares over a movement, then means over"
             " movements and seeds; degrees. “When published” is judged by where the arm is at the instant at which the "
             "answer is published, all other columns at the instant for which it is meant. Errors are of the instants at which "
-            "a contender answers; whether fused wins is judged where both do, and an answer less often is no win. "
+            "a contender answers; whether fused wins is judged where both do, and it wins no row where it answers less often. "
             f"Played: {span_in_words(summary['settings']['duration_s'])}.",
         ),
         tables=tuple(tables),
