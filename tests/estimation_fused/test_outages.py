@@ -126,7 +126,7 @@ def test_refused_poses_are_no_evidence_of_the_elbow_or_the_forearm() -> None:
         estimator = estimator_for(trial)
         assert isinstance(estimator, FusedEstimator)
         run(trial, estimator)
-        found.append((estimator, np.concatenate((estimator._elbow.recent, estimator._axial._settled.recent))))
+        found.append((estimator, np.concatenate((estimator._witness._elbow.recent, estimator._witness._axial._settled.recent))))
     assert found[0][0].counts() == {}
     assert found[1][0].counts() == {"m1_outlier": len(wrong)}
     assert np.allclose(found[0][1], found[1][1], atol=1e-6)

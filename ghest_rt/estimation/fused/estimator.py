@@ -9,7 +9,7 @@ import numpy as np
 from ghest_drivers.samples import EncoderSample
 from ghest_rt.estimation.arm import eq10_m0_from_arm, gh_from_arm_rotation, step3_4_5_e_from_arm
 from ghest_rt.estimation.arm_chain import CAMERAS, ArmChain, lost
-from ghest_rt.estimation.fused.axial import AxialJudge, twist_rad
+from ghest_rt.estimation.fused.axial import twist_rad
 from ghest_rt.estimation.fused.belief import ARM, SIZE, Belief
 from ghest_rt.estimation.fused.drift import DriftJudge
 from ghest_rt.estimation.fused.filter import FusedFilter
@@ -18,10 +18,10 @@ from ghest_rt.estimation.fused.joints import JointForecast, Joints
 from ghest_rt.estimation.fused.process import Process
 from ghest_rt.estimation.fused.reference import Reference
 from ghest_rt.estimation.fused.report import drift_report, rotation_covariance
-from ghest_rt.estimation.fused.settled import Settled
 from ghest_rt.estimation.fused.sighting import Sighting
 from ghest_rt.estimation.fused.timeline import Timeline
 from ghest_rt.estimation.fused.tuning import Tuning
+from ghest_rt.estimation.fused.witness import Witness
 from ghest_rt.estimation.inputs import NO_FRAMES, NOT_SEEN, Inputs
 from ghest_rt.estimation.reasons import gravest
 from ghest_rt.estimation.uncertainty import covariance_in_e, euler_sigma_rad
@@ -38,13 +38,9 @@ _LONGEST_BRIDGE_NS = 3_000_000_000
 # share of the station's limit.
 _SETTLED_SLACK = 10.0
 _UNSETTLED = 0.2
-# Elbow and forearm are compared with m1 this often: their disagreement is slow.
-_COMPARE_NS = 40_000_000
 # By how much a joint is moved to see how far it carries camera r1, rad or m.
 _SMALL_STEP = 1e-4
 _ARM_DIAGONAL = slice(ARM.start * (SIZE + 1), ARM.stop * (SIZE + 1), SIZE + 1)
-# Axes of the arm in the elbow frame, docs/frames.md: y of the elbow frame is z of the arm.
-_ELW_FROM_ARM = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 
 
 class FusedEstimator:
@@ -74,12 +70,8 @@ class FusedEstimator:
         self._tuning = tuning or Tuning()
         self._filter = FusedFilter(self._tuning, Process(self._tuning, chain.m1_from_elw[:3, 3]))
         self._judge = DriftJudge(self._tuning, chain.m0_from_gh, chain.m1_from_elw, arm_length_m)
-        self._reference = reference or Reference()
-        self._axial = AxialJudge(self._tuning, self._reference)
-        self._elbow = Settled(6, self._tuning.reference_s, self._tuning.elbow_memory_s)
+        self._witness = Witness(chain, self._tuning, reference or Reference())
         self._unsettled_rad = _UNSETTLED * chain.sigma_limit_rad
-        self._first_r1_from_m1: Array | None = None
-        self._compared_ns = 0
         self._carried: Array | None = None
         self._inputs = Inputs(EncoderTrack(chain.limits), CAMERAS, max_gap_ns)
         self._joints = JointForecast(self._inputs.encoders, max_gap_ns)
@@ -119,9 +111,8 @@ class FusedEstimator:
             if belief is None or belief.seen_ns[which] != sighting.t_ns:
                 return
             self._freshness.took(which, sighting.t_ns)
-            if which and sighting.t_ns - self._compared_ns >= _COMPARE_NS:
-                self._compared_ns = sighting.t_ns
-                self._compare_elbow(belief, sighting)
+            if which:
+                self._witness.compare(belief, sighting)
 
     def counts(self) -> dict[str, int]:
         """Return how many samples were not used, by reason."""
@@ -141,9 +132,7 @@ class FusedEstimator:
         belief = known.copy()
         self._forecast(belief, t_ns, joints)
         stale = self._freshness.stale(belief.seen_ns, t_ns)
-        first_elbow = self._elbow.first[:3] if self._elbow.started else None
-        evidence = self._reference.evidence(belief, first_elbow, self._axial.turned())
-        posture = self._judge.judge(belief, *self._elbow_moved(belief), evidence)
+        posture = self._judge.judge(belief, *self._witness.elbow_moved(belief), self._witness.evidence(belief))
         e_from_arm = step3_4_5_e_from_arm(posture.e_from_gh, posture.e_from_elw)
         newest_ns = {**self._inputs.newest_ns, "r0": belief.seen_ns[0], "r1": belief.seen_ns[1], "encoders": joints.newest_ns}
         if e_from_arm is None:
@@ -151,7 +140,7 @@ class FusedEstimator:
         m0_from_gh = self._chain.m0_from_gh
         m0_from_arm = eq10_m0_from_arm(posture.e_from_gh @ self._gh_from_m0, e_from_arm)
         gh_from_arm = gh_from_arm_rotation(m0_from_gh, m0_from_arm)
-        slip = self._axial.slip.explained(posture.turned)
+        slip = self._witness.slip.explained(posture.turned)
         slip_rad, slip_variance = slip.at(twist_rad(gh_from_arm))
         covariance, of_arm = rotation_covariance(posture), posture.covariance[ARM, ARM]
         if slip_rad or slip_variance:
@@ -216,39 +205,6 @@ class FusedEstimator:
         upper_arm = belief.gh_in_marker[1] - self._chain.m1_from_elw[:3, 3]
         diagonal = belief.P.ravel()[_ARM_DIAGONAL]
         diagonal += turn + place / float(upper_arm @ upper_arm)
-
-    def _elbow_moved(self, belief: Belief) -> tuple[Array | None, float]:
-        """Return how far the elbow, as m1 shows it, has moved in camera r1, and the variance of that without any drift.
-
-        It wanders with the arm's attitude in r1: its axis and the exoskeleton's are apart.
-
-        Returns:
-            (3,) axes of m1 as calibrated, m, or None before that is known; m^2 per axis.
-        """
-        if not self._elbow.ready:
-            return None, 0.0
-        moved = self._elbow.recent - self._elbow.first
-        in_e = belief.e_from_r1[:3, :3] @ moved[:3]
-        variance = self._tuning.elbow_m**2 + self._tuning.elbow_lever_m**2 * float(moved[3:] @ moved[3:])
-        return np.asarray(belief.base[1].turn @ (belief.e_from_marker[1].T @ in_e)), variance
-
-    def _compare_elbow(self, belief: Belief, sighting: Sighting) -> None:
-        """Note where the exoskeleton has the elbow; let the forearm judge whether m1 slips about the arm."""
-        base, R = belief.base[1], sighting.pose[:3, :3]
-        elbow = sighting.pose[:3, 3] + R @ (base.turn.T @ (self._chain.m1_from_elw[:3, 3] - base.slide))
-        r1_from_e = sighting.e_from_r1[:3, :3].T
-        r1_from_m1 = r1_from_e @ R @ base.turn.T
-        if self._first_r1_from_m1 is None:
-            self._first_r1_from_m1 = r1_from_m1
-        attitude = log_so3(r1_from_m1 @ self._first_r1_from_m1.T)
-        self._elbow.add(sighting.t_ns, np.concatenate((r1_from_e @ (elbow - sighting.e_from_r1[:3, 3]), attitude)))
-        forearm = self._chain.forearm_in_e(sighting.joints)
-        if forearm is None:
-            return
-        elw_from_e = self._chain.m1_from_elw[:3, :3].T @ base.turn @ R.T
-        gh_from_e = self._chain.m0_from_gh[:3, :3].T @ belief.base[0].turn @ belief.e_from_marker[0].T
-        gh_from_arm = gh_from_e @ elw_from_e.T @ _ELW_FROM_ARM
-        self._axial.add(sighting.t_ns, elw_from_e @ forearm, twist_rad(gh_from_arm))
 
     def _start(self) -> None:
         m0, m1 = self._last

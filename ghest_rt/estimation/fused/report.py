@@ -2,9 +2,10 @@
 
 import numpy as np
 
+from ghest_rt.estimation.fused.answers import DRIFT_SIZE, SLIDE, TURN
 from ghest_rt.estimation.fused.axial import Slip
 from ghest_rt.estimation.fused.belief import ACROMION, ARM
-from ghest_rt.estimation.fused.drift import DRIFT_SIZE, SLIDE, TURN, Posture
+from ghest_rt.estimation.fused.drift import Posture
 from ghest_rt.geometry.so3 import Array
 from ghest_rt.messages.results import DriftReport, MarkerDrift
 
