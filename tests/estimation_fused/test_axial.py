@@ -46,6 +46,15 @@ def test_a_cuff_that_turns_during_the_session_is_found() -> None:
     assert slip.lag == 0.0
 
 
+def test_a_cuff_that_has_just_turned_is_in_the_variance_before_the_means_tell() -> None:
+    slip = session(0.0, math.radians(5.0), seconds=4.2)
+    found, variance = slip.at(0.0)
+    assert abs(math.degrees(found)) < 2.0
+    assert abs(math.degrees(found) - 5.0) < 2.0 * math.degrees(math.sqrt(variance))
+    before = session(0.0, math.radians(5.0), seconds=3.9)
+    assert before.at(0.0) == (0.0, 0.0)
+
+
 def test_a_forearm_that_is_not_centred_makes_no_slip() -> None:
     assert session(0.0, 0.0) == Slip()
 

@@ -84,3 +84,11 @@ def test_the_stated_uncertainty_covers_what_cannot_be_told_of_a_turn_from_the_st
     assert max(j.error_deg / j.sigma_deg for j in judged) < 3.0
     last = judged[-1].estimate
     assert (last.status, last.reason) == (Status.DEGRADED, Reason.MARKER_DRIFT)
+
+
+@pytest.mark.parametrize("axis", [0, 2])
+def test_a_cuff_turned_far_across_the_arm_is_no_slide_that_no_cuff_can_make(axis: int) -> None:
+    """10 deg move the GH centre in m1 by 5 cm. A slide as far explains it as well, and would leave all of the turn in."""
+    judged = run(Trial(duration_s=4.0, drifts=(Drift("m1", turn(axis, 10.0)),)))
+    assert drift_of(judged[-1], "m1").flagged
+    assert rms_deg(judged, 2.0) < 3.0

@@ -22,6 +22,8 @@ TWIST, ELBOW, FIRST_ELBOW = slice(6, 7), slice(7, 10), slice(10, 13)
 _EVER, _SINCE = 1, 2
 # Keeps the rows regular in answers that say nothing about them.
 _REGULAR = np.diag(np.repeat((0.0, 1e-14), (6, ROWS - 6)))
+# A cuff lies around the arm: it slides along it, and so far across it, but for this share.
+_MOST_ACROSS_M, _SOFTNESS = 0.03, 0.1
 # The arm length is taken anew into the geometry when it has changed by this much.
 _LENGTH_STEP_M = 0.004
 
@@ -38,6 +40,7 @@ class Explained:
         spread: (36, 13, 13) the same for making use of them.
         W: (36, 13, 13) drift from what is found to deviate.
         rest: (36, 13, 13) covariance of the drift that this leaves.
+        m1_slide: (36, 3, 13) covariance of m1's slide and what is found.
     """
 
     base: object
@@ -47,6 +50,7 @@ class Explained:
     spread: Array
     W: Array
     rest: Array
+    m1_slide: Array
 
 
 class Answers:
@@ -106,6 +110,19 @@ class Answers:
             known = self._explained = self._explain(belief, length)
         return known
 
+    def implausible(self, explained: Explained, P: Array, found: Array) -> Array:
+        """Return (36,) what speaks against the answers because m1 would have slid farther across the arm than a cuff can.
+
+        Args:
+            explained: What the answers expect.
+            P: (13, 13) covariance of what is found.
+            found: (13,) what is found, against what is expected if nothing has drifted.
+        """
+        slide = np.einsum("hij,hj->hi", explained.m1_slide, solved(P + explained.spread, found))
+        across = slide - (slide @ self._along)[:, None] * self._along
+        beyond = np.sqrt(np.square(across).sum(axis=1)) / _MOST_ACROSS_M - 1.0
+        return np.asarray(np.square(np.maximum(beyond, 0.0) / _SOFTNESS))
+
     def _explain(self, belief: Belief, length_m: float) -> Explained:
         nominal = (self._gh_in_m0, self._elbow_in_m1 + length_m * self._along)
         G = np.zeros((ROWS, DRIFT_SIZE))
@@ -134,4 +151,10 @@ class Answers:
         W = np.swapaxes(np.linalg.solve(spread, weighted), 1, 2)
         rest = np.einsum("hj,jk->hjk", prior, np.eye(DRIFT_SIZE)) - W @ weighted
         tested = (all_G * test[:, None, :]) @ np.swapaxes(all_G, 1, 2)
-        return Explained(belief.base, length_m, expected, tested, spread, W, rest)
+        m1_slide = np.swapaxes(weighted[:, :, SLIDE[1]], 1, 2)
+        return Explained(belief.base, length_m, expected, tested, spread, W, rest, m1_slide)
+
+
+def solved(S: Array, found: Array) -> Array:
+    """Return (h, n) S^-1 found for (h, n, n) matrices and what is found, (n,)."""
+    return np.asarray(np.linalg.solve(S, np.broadcast_to(found[:, None], (len(S), len(found), 1)))[:, :, 0])

@@ -19,6 +19,9 @@ from ghest_rt.geometry.so3 import Array, quat_wxyz
 # Less than this of the forearm across the arm (a sine) says nothing about the arm's axial rotation.
 _LEAST_SINE = 0.3
 
+# Forearm and m1 disagree for a moment by as many times of what they may for long.
+_USUAL = 2.0
+
 
 @dataclass(frozen=True, slots=True)
 class Slip:
@@ -33,6 +36,7 @@ class Slip:
         offset_rad: Slip since the calibration that was there from the beginning.
         offset_variance: Of that, rad^2.
         offset_there: Probability that there is one.
+        astray_variance: What forearm and m1 disagree by just now, beyond all that and what is usual: its square, rad^2.
     """
 
     lag: float = 0.0
@@ -43,11 +47,13 @@ class Slip:
     offset_rad: float = 0.0
     offset_variance: float = 0.0
     offset_there: float = 0.0
+    astray_variance: float = 0.0
 
     def at(self, twist_rad: float) -> tuple[float, float]:
         """Return slip (rad) and its variance (rad^2) where m1 shows an axial rotation of `twist_rad`."""
         slip = self.lag * twist_rad + self.shift_rad + self.offset_rad
-        return slip, self.lag_variance * twist_rad**2 + self.shift_variance + self.offset_variance
+        variance = self.lag_variance * twist_rad**2 + self.shift_variance + self.offset_variance + self.astray_variance
+        return slip, variance
 
     def explained(self, share: float) -> "Slip":
         """Return the slip when a share of what was there from the beginning is a turn of m1 that has been taken out already."""
@@ -93,22 +99,27 @@ class AxialJudge:
         kept = math.exp(-dt / self._tuning.lag_memory_s)
         self._squares = kept * self._squares + dt * rapid_twist * rapid_twist
         self._products = kept * self._products + dt * rapid_twist * rapid_apart
-        self._decide()
+        self._decide(apart, twist_rad)
 
-    def _decide(self) -> None:
+    def _decide(self, apart: float, twist: float) -> None:
         tuning = self._tuning
         if self._squares <= 0.0:
             return
         noise = tuning.axial_noise_rad2_s / self._squares + tuning.lag_tolerance**2
         lag = self._products / self._squares
         lag, lag_variance, _ = _judged(lag, noise, tuning.lag_sigma**2, tuning.lag_cost)
-        shift, shift_variance, shifted = 0.0, 0.0, 0.0
+        shift, shift_variance, shifted, astray = 0.0, 0.0, 0.0, 0.0
         if self._settled.ready:
-            apart, twist = (self._settled.recent - self._settled.first).tolist()
+            first_apart, first_twist = self._settled.first.tolist()
+            recent_apart, recent_twist = self._settled.recent.tolist()
+            found = recent_apart - first_apart - lag * (recent_twist - first_twist)
             shift, shift_variance, shifted = _judged(
-                apart - lag * twist, tuning.axial_tolerance_rad**2, tuning.axial_shift_rad**2, tuning.axial_shift_cost
+                found, tuning.axial_tolerance_rad**2, tuning.axial_shift_rad**2, tuning.axial_shift_cost
             )
-        self.slip = Slip(lag, lag_variance, shift, shift_variance, shifted, *self._offset())
+            # Means lag behind a sudden slip: until they tell, it is in the variance.
+            left = apart - first_apart - lag * (twist - first_twist) - shift
+            astray = max(left * left - (_USUAL * tuning.axial_tolerance_rad) ** 2, 0.0)
+        self.slip = Slip(lag, lag_variance, shift, shift_variance, shifted, *self._offset(), astray)
 
     def turned(self) -> tuple[float, float] | None:
         """Return how far m1 has turned about the arm since the calibration, and the variance (rad, rad^2); None if unknown."""

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ghest_rt.estimation.fused.answers import TWIST, Answers, Explained
+from ghest_rt.estimation.fused.answers import TWIST, Answers, Explained, solved
 from ghest_rt.geometry.so3 import Array
 
 # Whether a marker has moved is told by these rows; the rest says what it did.
@@ -53,7 +53,7 @@ class Weighing:
             self._against[answers.ever] = np.maximum(self._against, evidence - evidence[0] - _CLEAR)[answers.ever]
         else:
             self._against[answers.came] = max(float(evidence[0] - evidence.min()) - _CLEAR, 0.0)
-        odds_against = answers.cost + self._against
+        odds_against = answers.cost + self._against + answers.implausible(explained, P, found)
         cost = evidence + odds_against
         if elbow_known:
             # The elbow tells what has happened to m1, not whether: alone, it has only moved beside the exoskeleton's.
@@ -76,8 +76,7 @@ def _probability(cost: Array, negligible: float) -> Array:
 
 def _evidence(S: Array, found: Array) -> Array:
     """Return -2 log N(found; 0, S) of each of the (h, n, n) covariances, but for a constant."""
-    solved = np.linalg.solve(S, np.broadcast_to(found[:, None], (len(S), len(found), 1)))[:, :, 0]
-    return np.asarray(solved @ found + np.linalg.slogdet(S)[1])
+    return np.asarray(solved(S, found) @ found + np.linalg.slogdet(S)[1])
 
 
 def _total(cost: Array) -> float:
