@@ -116,7 +116,7 @@ def run(quick: bool) -> dict[str, Any]:
         for row, label in enumerate(("orientation RMS (deg)", "position RMS (mm)")):
             _draw(axes[row][column], {method: [pair[row] for pair in pairs] for method, pairs in rms.items()}, label)
         axes[0][column].set_title(f"{sensor} sensor")
-    axes[0][0].legend(fontsize=8)
+    figure.legend(*axes[0][0].get_legend_handles_labels(), loc="outside upper center", ncols=len(METHODS), fontsize=9)
     _OUT.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(_OUT, dpi=120)
     return results
