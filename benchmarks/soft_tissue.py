@@ -21,9 +21,10 @@ from ghest_rt.simulation.calibrating import with_reference
 from ghest_rt.simulation.command import SimulateOptions
 from ghest_rt.studies.observing.observed import observe
 from ghest_rt.studies.observing.scenario import Scenario
-from ghest_rt.studies.rivals.angle_errors import ANGLES, Answers, error_statistics, truth_track
+from ghest_rt.studies.rivals.angle_errors import ANGLES, Answers, error_statistics
 from ghest_rt.studies.rivals.running import run_without_cameras
 from ghest_rt.studies.session.estimating import estimate_session
+from ghest_rt.studies.truth import TruthTrack
 from ghest_rt.vision.station import Method
 
 _MOVEMENTS = ("SFE", "SAbAd", "SIR", "COMB")
@@ -43,7 +44,7 @@ def judged(movement: str, seed: int, duration_s: float, *, reference: bool) -> d
     }
     instants_ns = answers["refined"].t_ns
     answers["exoskeleton"] = run_without_cameras(session, scenario.sensor, seed, instants_ns)["exoskeleton"]
-    truth = truth_track(session.truth)
+    truth = TruthTrack.of(session.truth)
     return {key: {name: error_statistics(said, truth)[name] for name in _COLUMNS} for key, said in answers.items()}
 
 

@@ -59,6 +59,30 @@ def test_a_forearm_that_is_not_centred_makes_no_slip() -> None:
     assert session(0.0, 0.0) == Slip()
 
 
+@pytest.mark.parametrize("hold_s", [0.0, 4.0])
+def test_a_carrying_angle_makes_no_slip_when_the_elbow_stretches(hold_s: float) -> None:
+    judge = AxialJudge(Tuning())
+    for k in range(round((8.0 + hold_s) * 25)):
+        t = k / 25.0
+        elbow_rad = math.radians(90.0 - 65.0 * min(max((t - 3.0) / 4.0, 0.0), 1.0))
+        at_skin = math.radians(20.0) * math.sin(2.0 * math.pi * 0.25 * t)
+        forearm = np.array([math.sin(math.radians(4.0)), -math.cos(elbow_rad), -math.sin(elbow_rad)])
+        judge.add(START + k * 40 * MS, forearm / np.linalg.norm(forearm), at_skin)
+    slip_rad, variance = judge.slip.at(0.0)
+    assert judge.slip.shifted < 0.5
+    assert abs(math.degrees(slip_rad)) < 1.5
+    assert math.degrees(math.sqrt(variance)) < 2.0
+
+
+def test_what_a_bent_elbow_told_of_the_moment_ends_with_the_bend() -> None:
+    judge = AxialJudge(Tuning())
+    for k in range(80):
+        judge.add(START + k * 40 * MS, shown(math.radians(8.0 if k > 70 else 0.0), math.radians(90.0)), 0.1 * math.sin(k))
+    assert judge.slip.astray_variance > 0.0
+    judge.add(START + 81 * 40 * MS, shown(0.0, math.radians(10.0)), 0.0)
+    assert judge.slip.astray_variance == 0.0
+
+
 def test_a_stretched_elbow_says_nothing() -> None:
     assert session(0.3, 0.0, elbow_deg=10.0) == Slip()
 

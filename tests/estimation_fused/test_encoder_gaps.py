@@ -30,10 +30,10 @@ class Link:
         self.track = EncoderTrack(np.array([[-9.0, 9.0]]))
         self.forecast = JointForecast(self.track, 100 * MS)
 
-    def row(self, k: int) -> int:
-        t_ns = START + k * self.step_ns
+    def row(self, k: float) -> int:
+        t_ns = START + round(k * self.step_ns)
         resolution = 2.0 * math.pi / 2**14
-        sample = EncoderSample(k, np.array([round(swing(t_ns) / resolution) * resolution]), t_ns, t_ns, t_ns)
+        sample = EncoderSample(round(10 * k), np.array([round(swing(t_ns) / resolution) * resolution]), t_ns, t_ns, t_ns)
         assert self.track.add(sample) is None
         self.forecast.add(sample)
         return t_ns
@@ -66,6 +66,18 @@ def test_between_rows_with_four_missing_the_joints_are_less_certain(step_ms: flo
     missing, error = link.at(START + round(61.5 * link.step_ns))
     assert missing > 3.0 * usual
     assert error < 3.0 * missing
+
+
+@RATES
+def test_one_row_that_comes_early_makes_the_others_no_gaps(step_ms: float) -> None:
+    link = Link(step_ms)
+    for k in (*range(60), 60.4, *range(61, 64)):
+        newest_ns = link.row(k)
+    usual, _ = link.at(START + round(50.5 * link.step_ns))
+    after, _ = link.at(START + round(62.5 * link.step_ns))
+    ahead, _ = link.at(newest_ns + link.step_ns)
+    assert after < 1.5 * usual
+    assert ahead < 20.0 * usual
 
 
 @RATES

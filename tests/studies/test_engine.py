@@ -36,6 +36,17 @@ def test_values_come_in_the_order_asked_for_and_needs_first(tmp_path: Path, work
     assert spent_cpu_s(tasks, store) >= 0.0
 
 
+def test_what_finished_tasks_needed_may_be_gone(tmp_path: Path) -> None:
+    log, store = tmp_path / "log", ResultStore(tmp_path / "tasks")
+    base = square_task(3, log)
+    tasks = [square_task(1, log, needs=(base,))]
+    run_tasks([base, *tasks], store, LocalExecutor(1))
+    for path in store.folder.glob(f"{base.key(salt.code_salt)}*"):
+        path.unlink()
+    assert [value["found"] for value in run_tasks(tasks, store, LocalExecutor(1))] == [10]
+    assert spent_cpu_s(tasks, store) >= 0.0
+
+
 def test_what_is_there_is_not_run_again_and_an_interrupted_study_goes_on_where_it_was(tmp_path: Path) -> None:
     log, store = tmp_path / "log", ResultStore(tmp_path / "tasks")
     tasks = [square_task(n, log) for n in range(6)]

@@ -88,7 +88,8 @@ def _show(document: dict[str, Any], console: "Console") -> None:
         if seldom:
             console.print(f"Not answered at every instant: {', '.join(seldom)}", markup=False, highlight=False)
     console.print(
-        "publ.: judged at the instant of publishing; fused wins: movements in which it is nearer in all other columns"
+        "publ.: judged at the instant of publishing; fused wins: movements in which it is nearer in orientation and all three "
+        "angles where both answer, and answers as often"
     )
     rest = document["inertial_after_rest"]
     console.print(

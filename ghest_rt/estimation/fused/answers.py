@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ghest_rt.estimation.fused.belief import Belief
+from ghest_rt.estimation.fused.belief import Base, Belief
 from ghest_rt.estimation.fused.tuning import Tuning
 from ghest_rt.geometry.so3 import Array, skew
 
@@ -43,7 +43,7 @@ class Explained:
         m1_slide: (36, 3, 13) covariance of m1's slide and what is found.
     """
 
-    base: object
+    base: tuple[Base, Base]
     length_m: float
     expected: Array
     test: Array
@@ -118,7 +118,7 @@ class Answers:
             P: (13, 13) covariance of what is found.
             found: (13,) what is found, against what is expected if nothing has drifted.
         """
-        slide = np.einsum("hij,hj->hi", explained.m1_slide, solved(P + explained.spread, found))
+        slide = explained.base[1].slide + np.einsum("hij,hj->hi", explained.m1_slide, solved(P + explained.spread, found))
         across = slide - (slide @ self._along)[:, None] * self._along
         beyond = np.sqrt(np.square(across).sum(axis=1)) / _MOST_ACROSS_M - 1.0
         return np.asarray(np.square(np.maximum(beyond, 0.0) / _SOFTNESS))

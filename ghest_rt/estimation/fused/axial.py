@@ -73,8 +73,8 @@ class AxialJudge:
         """
         self._tuning = tuning
         self._reference = reference or Reference()
-        # Disagreement of forearm and m1, and the twist that m1 shows.
-        self._settled = Settled(2, tuning.reference_s, tuning.axial_memory_s)
+        # Disagreement of forearm and m1, the twist that m1 shows, and by how much a carrying angle weighs in the disagreement.
+        self._settled = Settled(3, tuning.reference_s, tuning.axial_memory_s)
         # Integrals of the rapid parts: twist^2 and twist * disagreement, rad^2 s.
         self._squares = self._products = 0.0
         self.slip = Slip()
@@ -88,20 +88,29 @@ class AxialJudge:
             twist_rad: Axial rotation of the arm as m1 shows it.
         """
         x, _, z = elw_from_forearm.tolist()
-        if math.hypot(x, z) < _LEAST_SINE:
+        sine = math.hypot(x, z)
+        if sine < _LEAST_SINE:
+            self.slip = replace(self.slip, astray_variance=0.0)
             return
         # The elbow's axis is the frame's x: the forearm lies in its y-z plane but for the slip and what is constant.
         apart = math.atan2(x, z) if z > 0.0 else math.atan2(-x, -z)
-        dt = self._settled.add(t_ns, np.array([apart, twist_rad]))
+        dt = self._settled.add(t_ns, np.array([apart, twist_rad, 1.0 / sine]))
         if dt == 0.0:
             return
-        rapid_apart, rapid_twist = apart - float(self._settled.recent[0]), twist_rad - float(self._settled.recent[1])
-        kept = math.exp(-dt / self._tuning.lag_memory_s)
-        self._squares = kept * self._squares + dt * rapid_twist * rapid_twist
-        self._products = kept * self._products + dt * rapid_twist * rapid_apart
-        self._decide(apart, twist_rad)
+        recent_apart, recent_twist, recent_weight = self._settled.recent.tolist()
+        # An elbow that bends quickly looks like a slip of the carrying angle's.
+        if self._tolerance_rad2(1.0 / sine - recent_weight) < 2.0 * self._tolerance_rad2(0.0):
+            rapid_apart, rapid_twist = apart - recent_apart, twist_rad - recent_twist
+            kept = math.exp(-dt / self._tuning.lag_memory_s)
+            self._squares = kept * self._squares + dt * rapid_twist * rapid_twist
+            self._products = kept * self._products + dt * rapid_twist * rapid_apart
+        self._decide(apart, twist_rad, 1.0 / sine)
 
-    def _decide(self, apart: float, twist: float) -> None:
+    def _tolerance_rad2(self, weight: float) -> float:
+        """Return the variance that is no slip, where a carrying angle weighs differently by so much."""
+        return self._tuning.axial_tolerance_rad**2 + (self._tuning.carrying_rad * weight) ** 2
+
+    def _decide(self, apart: float, twist: float, weight: float) -> None:
         tuning = self._tuning
         if self._squares <= 0.0:
             return
@@ -110,23 +119,22 @@ class AxialJudge:
         lag, lag_variance, _ = _judged(lag, noise, tuning.lag_sigma**2, tuning.lag_cost)
         shift, shift_variance, shifted, astray = 0.0, 0.0, 0.0, 0.0
         if self._settled.ready:
-            first_apart, first_twist = self._settled.first.tolist()
-            recent_apart, recent_twist = self._settled.recent.tolist()
+            first_apart, first_twist, first_weight = self._settled.first.tolist()
+            recent_apart, recent_twist, recent_weight = self._settled.recent.tolist()
             found = recent_apart - first_apart - lag * (recent_twist - first_twist)
-            shift, shift_variance, shifted = _judged(
-                found, tuning.axial_tolerance_rad**2, tuning.axial_shift_rad**2, tuning.axial_shift_cost
-            )
+            tolerance = self._tolerance_rad2(recent_weight - first_weight)
+            shift, shift_variance, shifted = _judged(found, tolerance, tuning.axial_shift_rad**2, tuning.axial_shift_cost)
             # Means lag behind a sudden slip: until they tell, it is in the variance.
             left = apart - first_apart - lag * (twist - first_twist) - shift
-            astray = max(left * left - (_USUAL * tuning.axial_tolerance_rad) ** 2, 0.0)
+            astray = max(left * left - _USUAL**2 * self._tolerance_rad2(weight - first_weight), 0.0)
         self.slip = Slip(lag, lag_variance, shift, shift_variance, shifted, *self._offset(), astray)
 
     def turned(self) -> tuple[float, float] | None:
         """Return how far m1 has turned about the arm since the calibration, and the variance (rad, rad^2); None if unknown."""
         if self._reference.forearm_rad is None or not self._settled.started:
             return None
-        apart, twist = self._settled.first.tolist()
-        variance = self._reference.forearm_sigma_rad**2 + self._tuning.axial_tolerance_rad**2
+        apart, twist, weight = self._settled.first.tolist()
+        variance = self._reference.forearm_sigma_rad**2 + self._tolerance_rad2(weight - 1.0)
         return self._reference.forearm_rad - (apart - self.slip.lag * twist), variance
 
     def _offset(self) -> tuple[float, float, float]:

@@ -69,8 +69,8 @@ class FusedEstimator:
         self._chain = chain
         self._tuning = tuning or Tuning()
         self._filter = FusedFilter(self._tuning, Process(self._tuning, chain.m1_from_elw[:3, 3]))
-        self._judge = DriftJudge(self._tuning, chain.m0_from_gh, chain.m1_from_elw, arm_length_m)
-        self._witness = Witness(chain, self._tuning, reference or Reference())
+        self._arm_length_m, self._reference = arm_length_m, reference or Reference()
+        self._judge, self._witness = self._fresh()
         self._unsettled_rad = _UNSETTLED * chain.sigma_limit_rad
         self._carried: Array | None = None
         self._inputs = Inputs(EncoderTrack(chain.limits), CAMERAS, max_gap_ns)
@@ -105,6 +105,7 @@ class FusedEstimator:
             self._timeline.add(sighting)
             if self._timeline.mistaken:
                 self._timeline = None
+                self._judge, self._witness = self._fresh()
                 self._start()
                 return
             belief = self._timeline.belief_at(sighting.t_ns)
@@ -205,6 +206,12 @@ class FusedEstimator:
         upper_arm = belief.gh_in_marker[1] - self._chain.m1_from_elw[:3, 3]
         diagonal = belief.P.ravel()[_ARM_DIAGONAL]
         diagonal += turn + place / float(upper_arm @ upper_arm)
+
+    def _fresh(self) -> tuple[DriftJudge, Witness]:
+        """Return what knows nothing of the session yet."""
+        chain, tuning = self._chain, self._tuning
+        judge = DriftJudge(tuning, chain.m0_from_gh, chain.m1_from_elw, self._arm_length_m)
+        return judge, Witness(chain, tuning, self._reference)
 
     def _start(self) -> None:
         m0, m1 = self._last

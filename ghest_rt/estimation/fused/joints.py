@@ -94,7 +94,7 @@ class JointForecast:
             if self._forecasts is not None and step_s <= _USUAL_STEPS * (self._step_s or step_s):
                 self._judge(sample, step_s)
             # Rows that are missing make no slower link.
-            self._step_s = min(step_s, 1.1 * self._step_s) if self._step_s else step_s
+            self._step_s = min(max(step_s, self._step_s / 1.1), 1.1 * self._step_s) if self._step_s else step_s
         last.append(sample)
         self._forecasts = _forecasts(last) if len(last) >= _LEAST_SAMPLES else None
         self._mean = self._weighted()
@@ -129,9 +129,9 @@ class JointForecast:
 
     def _between(self, gap_s: float) -> Array:
         """Return the variance between two samples: that of a sample, unless some are missing."""
-        if self._errors is None or gap_s <= _USUAL_STEPS * self._step_s:
-            return self._of_sample if self._errors is not None else self._unknown(0.0)
-        return self._grown(0.5 * gap_s)
+        if gap_s <= _USUAL_STEPS * self._step_s:
+            return self._unknown(0.0) if self._errors is None else self._of_sample
+        return self._unknown(0.5 * gap_s) if self._errors is None else self._grown(0.5 * gap_s)
 
     def _ahead(self, ahead_s: float) -> Array:
         """Return the variance of a forecast: it grows from that of a sample, as it has been seen to."""

@@ -61,6 +61,7 @@ class Tuning:
         elbow_lever_m: How much farther per radian that the arm turns there: the patient's axis is beside the exoskeleton's.
         axial_noise_rad2_s: Spectral density of the forearm's wander against the arm during movement.
         axial_tolerance_rad: What forearm and m1 may come to disagree by without a slip.
+        carrying_rad: Standard deviation of the forearm out of the elbow frame's y-z plane: magnified as the elbow stretches.
         axial_shift_rad: Standard deviation of a slip of m1 about the arm, if there is one.
         axial_shift_cost: Twice the logarithm of the odds against it.
         axial_offset_rad: Standard deviation of a turn of m1 about the arm since the calibration, if there is one.
@@ -123,6 +124,7 @@ class Tuning:
     elbow_lever_m: float = 0.015
     axial_noise_rad2_s: float = math.radians(0.5) ** 2 * 0.3
     axial_tolerance_rad: float = math.radians(1.0)
+    carrying_rad: float = math.radians(5.0)
     axial_shift_rad: float = math.radians(8.0)
     axial_shift_cost: float = 8.0
     axial_offset_rad: float = math.radians(5.0)

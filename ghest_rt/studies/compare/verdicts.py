@@ -53,7 +53,7 @@ def verdict(
     """
     shares = theirs["answered_fraction"], fused["answered_fraction"]
     answered = f"answered are {percent(shares[1])} % of the instants against {percent(shares[0])} %"
-    if shares[0] == 0.0:
+    if shares[0] == 0.0 and shares[1] > 0.0:
         return Verdict(True, True, (), f"fused wins: {who.title} has no answer at all")
     if math.isnan(theirs["orientation_deg"]):
         return Verdict(False, False, ("answered_fraction",), f"fused never answers where {who.title} does: {answered}")

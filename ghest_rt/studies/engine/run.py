@@ -83,7 +83,7 @@ def spent_cpu_s(tasks: Sequence[Task], store: ResultStore) -> float:
     keys: dict[Task, str] = {}
     for task in tasks:
         _add_keys(task, keys)
-    return sum(store.cpu_s(key) for key in keys.values())
+    return sum(store.cpu_s(key) for key in keys.values() if store.has(key))
 
 
 def _add_keys(task: Task, keys: dict[Task, str]) -> None:

@@ -24,6 +24,7 @@ _JUDGING = (
     "estimation",
     "kinematics",
     "studies/metrics.py",
+    "studies/paper_values.py",
     "studies/rivals/angle_errors.py",
     "studies/session",
     "studies/truth.py",

@@ -51,7 +51,7 @@ class ResultStore:
             return False
         if not isinstance(found, dict) or not {"cpu_s", "values", "values_sha256", "arrays_sha256"} <= set(found):
             return False
-        if _hash_of_json(found["values"]) != found["values_sha256"]:
+        if _hash_of_json([found["cpu_s"], found["values"]]) != found["values_sha256"]:
             return False
         try:
             return found["arrays_sha256"] is None or _hash_of_file(self._npz(key)) == found["arrays_sha256"]
@@ -81,7 +81,7 @@ class ResultStore:
             kept = {
                 "cpu_s": cpu_s,
                 "values": result.values,
-                "values_sha256": _hash_of_json(result.values),
+                "values_sha256": _hash_of_json([cpu_s, result.values]),
                 "arrays_sha256": arrays_sha256,
             }
             part.write_text(json.dumps(kept), encoding="utf-8")

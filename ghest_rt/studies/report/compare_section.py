@@ -1,6 +1,7 @@
 """The report's section on the comparison: Table 7 made real."""
 
 from pathlib import Path
+from statistics import fmean
 from typing import Any
 
 from ghest_rt.studies.compare.verdicts import tally
@@ -99,8 +100,12 @@ def _table(summary: Row, sensor: str, kind: str) -> Table:
 
 
 def _movements(summary: Row, sensor: str, kind: str, column: str) -> dict[str, float]:
-    """Return the movements of a kind and what a column says of each."""
-    return {r["movement"]: r[column] for r in summary["rows"] if (r["sensor"], r["kind"]) == (sensor, kind)}
+    """Return the movements of a kind and what a column says of each, mean over the seeds."""
+    said: dict[str, list[float]] = {}
+    for row in summary["rows"]:
+        if (row["sensor"], row["kind"]) == (sensor, kind):
+            said.setdefault(row["movement"], []).append(row[column])
+    return {movement: fmean(values) for movement, values in said.items()}
 
 
 def _by_movement(summary: Row, sensor: str) -> Table:

@@ -17,7 +17,6 @@ ANGLE_QUANTITIES = ("orientation_deg", "published_deg", *ANGLES, "plane_deg")
 the plane of shoulder, elbow and wrist (what the swivel angle tells)."""
 
 
-truth_track = TruthTrack.of
 """By the name that the benchmarks know."""
 
 
