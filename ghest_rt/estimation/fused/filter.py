@@ -42,8 +42,9 @@ _SURGE_SHARES = (0.05, 0.3, 1.0)
 # Standard deviations of a belief before the first pair of sightings.
 _UNKNOWN_RAD, _UNKNOWN_M, _UNKNOWN_RAD_S, _UNKNOWN_M_S = 0.5, 0.2, 1.0, 0.3
 
-_POSITION = np.arange(3, 6)
-_PLACES = np.r_[GH, GH_RATE, BOTH_GH]
+# Diagonal of the positions in a flat (6, 6) matrix.
+_POSITIONS = slice(21, 36, 7)
+_PLACES = (GH, GH_RATE, BOTH_GH)
 
 _Item = TypeVar("_Item")
 
@@ -213,7 +214,7 @@ class _Update:
     def __init__(self, P: Array, innovation: Innovation, R: Array) -> None:
         H = innovation.H
         noise = R.copy()
-        noise[_POSITION, _POSITION] += innovation.bend_m2
+        noise.ravel()[_POSITIONS] += innovation.bend_m2
         self._P, self._H_P = P, H @ P
         self._residual = innovation.residual
         self._without_rotation = innovation.without_rotation
@@ -234,7 +235,9 @@ class _Update:
         """Correct a belief."""
         T, H_P = self._without_rotation, self._H_P
         gain = (self._information @ H_P).T
-        gain[_PLACES] = ((T.T @ inverse_3(self._place_spread)) @ (T @ H_P)).T[_PLACES]
+        of_places = ((T.T @ inverse_3(self._place_spread)) @ (T @ H_P)).T
+        for part in _PLACES:
+            gain[part] = of_places[part]
         # Joseph's (1 - K H) P (1 - K H)^T + K R K^T, multiplied out, and its symmetric part.
         P = self._P + gain @ (self.spread @ gain.T - 2.0 * H_P)
         belief.P = 0.5 * (P + P.T)

@@ -19,7 +19,8 @@ _EYE_3 = np.eye(3)
 # Diagonals of blocks in the flat covariance.
 _POSE, _GH, _RATE = (slice(part.start * (SIZE + 1), part.stop * (SIZE + 1), SIZE + 1) for part in (POSES, BOTH_GH, RATES))
 _POSE_RATE = slice(RATES.start, RATES.start + 9 * (SIZE + 1), SIZE + 1)
-_EACH_BODY = np.repeat(np.eye(2), (6, 3), axis=0)
+# Which of the poses move with m0: the acromion, and the GH centre.
+_OF_M0 = np.repeat((1.0, 0.0), (6, 3))
 _RATE_POSE = slice(RATES.start * SIZE, RATES.start * SIZE + 9 * (SIZE + 1), SIZE + 1)
 # A slack above this is a contradiction between the markers that no movement explains.
 _CLEAR_SLACK = 8.0
@@ -39,9 +40,8 @@ class Process:
         self._memory_s = tuning.rate_memory_s
         self._bridging = tuning.bridging_agility
         self._jerk_s, self._jerky_agility = tuning.jerk_s, tuning.jerky_agility
-        self._density = np.empty(9)
-        self._density[ACROMION] = self._density[ARM] = tuning.rotation_density
-        self._density[GH] = tuning.position_density
+        density = np.repeat((tuning.rotation_density, tuning.position_density, tuning.rotation_density), 3)
+        self._density = density * _OF_M0, density * (1.0 - _OF_M0)
         self._loose_m2_s = tuning.loose_m2_s
         self._creep = np.empty(6)
         for part, creep in zip(GH_IN_MARKER, tuning.creep_m2_s, strict=True):
@@ -89,14 +89,18 @@ class Process:
         tau = self._memory_s
         fresh = 0.5 * tau * (1.0 - decay * decay)
         carry = tau * (1.0 - decay)
-        agility = _EACH_BODY @ (self._agility(belief, 0, t_ns), self._agility(belief, 1, t_ns))
-        density = doubt * self._density * agility
-        # Quick movement is also jerky: part of what a pose does is none of its rate's doing.
-        jerk = (dt * self._jerk_s * self._jerk_s) * (agility / (agility + self._jerky_agility))
+        smooth, jerky = tau * tau * (dt - 2.0 * carry + fresh), dt * self._jerk_s * self._jerk_s
+        driven, posed = np.zeros(9), np.zeros(9)
+        for which, density in enumerate(self._density):
+            agility = self._agility(belief, which, t_ns)
+            # Quick movement is also jerky: part of what a pose does is none of its rate's doing.
+            jerk = jerky * agility / (agility + self._jerky_agility)
+            driven = driven + (doubt * agility) * density
+            posed = posed + (doubt * agility * (smooth + jerk)) * density
         diagonal = belief.P.ravel()
-        diagonal[_POSE] += (tau * tau * (dt - 2.0 * carry + fresh) + jerk) * density
-        diagonal[_RATE] += fresh * density
-        cross = (0.5 * carry * carry) * density
+        diagonal[_POSE] += posed
+        diagonal[_RATE] += fresh * driven
+        cross = (0.5 * carry * carry) * driven
         diagonal[_POSE_RATE] += cross
         diagonal[_RATE_POSE] += cross
         creep = diagonal[_GH]
@@ -126,8 +130,16 @@ def follow_encoders(belief: Belief, upper_arm: Array, p_gh: Array, e_from_r1: Ar
     ax, ay, az = _unit(upper_arm)
     bx, by, bz = _unit(p_gh - p_elbow)
     # Shortest rotation from V to W: I + [c]x + [c]x^2 / (1 + V.W), c = V x W.
-    C = skew(np.array([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx]))
-    swing = _EYE_3 + C + C @ C / max(1.0 + ax * bx + ay * by + az * bz, _LEAST)
+    cx, cy, cz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+    k = 1.0 / max(1.0 + ax * bx + ay * by + az * bz, _LEAST)
+    xy, xz, yz = k * cx * cy, k * cx * cz, k * cy * cz
+    swing = np.array(
+        [
+            [1.0 - k * (cy * cy + cz * cz), xy - cz, xz + cy],
+            [xy + cz, 1.0 - k * (cx * cx + cz * cz), yz - cx],
+            [xz - cy, yz + cx, 1.0 - k * (cx * cx + cy * cy)],
+        ]
+    )
     w, x, y, z = quat_wxyz(moved)
     twist = 2.0 * math.atan2(x * ax + y * ay + z * az, w)
     follow = np.asarray(swing @ exp_so3(np.array([twist * ax, twist * ay, twist * az])))
