@@ -58,7 +58,7 @@ def compare(
         seeds=seeds or 1,
     )
     store, runs_on = opened(out, workers, scheduler)
-    with shown_progress("compare") as progress:
+    with shown_progress("study compare") as progress:
         summary = run_compare(settings, store, runs_on, progress)
     document = write_study(out, summary, {"rows": summary["rows"]}, figures(summary))
     finish(document, out, as_json, _show)

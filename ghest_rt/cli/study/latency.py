@@ -67,7 +67,7 @@ def latency(
         computing_frames=QUICK_COMPUTING_FRAMES if quick else COMPUTING_FRAMES,
     )
     store, runs_on = opened(out, workers, scheduler)
-    with shown_progress("latency") as progress:
+    with shown_progress("study latency") as progress:
         summary = run_latency(settings, store, runs_on, progress)
     document = write_study(out, summary, {"rows": summary["rows"]}, figures(summary))
     finish(document, out, as_json, _show)

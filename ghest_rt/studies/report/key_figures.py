@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
+from ghest_rt.studies.movements import MEAN_OF_MOVEMENTS
 from ghest_rt.studies.numbers import number, span_in_words
 from ghest_rt.studies.paper_values import MEAN, MEAN_RMSE_20_MM_DEG
 from ghest_rt.studies.report.page import KeyFigure
@@ -28,7 +29,7 @@ def _accuracy(summary: Row) -> list[KeyFigure]:
     found = {
         entry["method"]: entry["rms"]
         for entry in summary["table"]
-        if (entry["sensor"], entry["quantity"], entry["movement"]) == ("paper", "orientation_deg", "mean")
+        if (entry["sensor"], entry["quantity"], entry["movement"]) == ("paper", "orientation_deg", MEAN_OF_MOVEMENTS)
     }
     if "fused" not in found:
         return []
