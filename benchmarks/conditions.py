@@ -4,9 +4,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from ghest_rt.simulation.command import SimulateOptions
 from ghest_rt.simulation.disturbances import parse_shift, parse_turn
 from ghest_rt.simulation.faults import parse_fault
+from ghest_rt.simulation.options import SimulateOptions
 from ghest_rt.vision.station import Method
 
 TUNING_SEEDS = (11,)

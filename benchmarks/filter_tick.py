@@ -9,7 +9,7 @@ from benchmarks.timing import summary_ms
 from ghest_rt.estimation.factory import make_estimator
 from ghest_rt.estimation.interface import GhEstimator
 from ghest_rt.estimation.pipeline import lag_ns_of
-from ghest_rt.simulation.command import SimulateOptions
+from ghest_rt.simulation.options import SimulateOptions
 
 _WARM_UP = 60
 

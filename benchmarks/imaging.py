@@ -14,8 +14,9 @@ from matplotlib.figure import Figure
 from ghest_drivers.samples import CameraInfo, RgbdFrame
 from ghest_rt.config.station import Marker
 from ghest_rt.geometry.so3 import Array, log_so3
-from ghest_rt.simulation.command import SimulateOptions, build_world
+from ghest_rt.simulation.building import build_world
 from ghest_rt.simulation.optics import parse_imaging
+from ghest_rt.simulation.options import SimulateOptions
 from ghest_rt.vision.factory import Method, make_detector
 
 SensorName = Literal["paper", "sr300"]

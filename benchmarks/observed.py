@@ -14,10 +14,11 @@ from ghest_rt.estimation.interface import GhEstimator
 from ghest_rt.estimation.pipeline import Pipeline
 from ghest_rt.messages.results import GhEstimate, MarkerObservation
 from ghest_rt.simulation.anatomy import anatomy
+from ghest_rt.simulation.building import build_world
 from ghest_rt.simulation.calibrating import with_reference
-from ghest_rt.simulation.command import SimulateOptions, build_world
 from ghest_rt.simulation.faults import FaultyDevices
 from ghest_rt.simulation.fitting import fit_station
+from ghest_rt.simulation.options import SimulateOptions
 from ghest_rt.studies.engine.salt import code_salt
 from ghest_rt.studies.observing.tasks import observe_session
 from ghest_rt.studies.truth import TruthTrack

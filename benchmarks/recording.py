@@ -31,7 +31,8 @@ from ghest_rt.service.recorder import Recorder
 from ghest_rt.service.recorder_parts import Parts
 from ghest_rt.service.recorder_settings import RecorderCounts, RecorderSettings
 from ghest_rt.service.recorder_taps import RecordedCamera, RecordedEncoders, RecorderOutput
-from ghest_rt.simulation.command import SimulateOptions, build_world
+from ghest_rt.simulation.building import build_world
+from ghest_rt.simulation.options import SimulateOptions
 from ghest_rt.simulation.world import World
 
 _RATE_HZ = 60

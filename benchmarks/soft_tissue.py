@@ -18,7 +18,7 @@ from benchmarks.scenes import FOLDER
 from ghest_rt.estimation.pipeline import lag_ns_of
 from ghest_rt.simulation.anatomy import anatomy
 from ghest_rt.simulation.calibrating import with_reference
-from ghest_rt.simulation.command import SimulateOptions
+from ghest_rt.simulation.options import SimulateOptions
 from ghest_rt.studies.observing.observed import observe
 from ghest_rt.studies.observing.scenario import Scenario
 from ghest_rt.studies.rivals.angle_errors import ANGLES, Answers, error_statistics

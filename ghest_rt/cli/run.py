@@ -159,7 +159,7 @@ def _world(station: LoadedStation, options: RunOptions, start_ns: int) -> "LiveW
         return None
     need_extra("sim", "a simulated station")
     from ghest_rt.cli.sim_world import LiveWorld  # noqa: PLC0415  (needs the extra `sim`)
-    from ghest_rt.simulation.command import SimulateOptions  # noqa: PLC0415
+    from ghest_rt.simulation.options import SimulateOptions  # noqa: PLC0415
 
     return LiveWorld(
         SimulateOptions(

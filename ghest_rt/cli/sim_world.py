@@ -4,7 +4,8 @@ from ghest_rt.cli.scoreboard import Scoreboard
 from ghest_rt.config.load import LoadedStation
 from ghest_rt.messages.published import Event, GhAngles, Health
 from ghest_rt.messages.results import GhEstimate
-from ghest_rt.simulation.command import SimulateOptions, stage_world
+from ghest_rt.simulation.building import stage_world
+from ghest_rt.simulation.options import SimulateOptions
 from ghest_rt.simulation.staged import StagedWorld
 
 

@@ -6,7 +6,8 @@ from rich.console import Console
 from rich.progress import Progress
 
 from ghest_rt.cli.console import print_json
-from ghest_rt.simulation.command import SimulateOptions, simulate
+from ghest_rt.simulation.command import simulate
+from ghest_rt.simulation.options import SimulateOptions
 
 
 def simulate_recording(options: SimulateOptions, as_json: bool) -> None:

@@ -4,87 +4,18 @@ import shlex
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
-from typing import Literal
 
 from ghest_drivers.samples import RgbdFrame
-from ghest_rt.config.load import LoadedStation, load_station
-from ghest_rt.config.shipped import shipped_config_dir
-from ghest_rt.errors import BadInputError
 from ghest_rt.recording.writer import RecordingWriter
-from ghest_rt.simulation.anatomy import anatomy
-from ghest_rt.simulation.calibrating import with_reference
-from ghest_rt.simulation.disturbances import MarkerMove, SoftTissueName
-from ghest_rt.simulation.faults import DeviceFault, FaultyDevices
-from ghest_rt.simulation.fitting import fit_station, without_depth
-from ghest_rt.simulation.imaging import Light
-from ghest_rt.simulation.knee import DURATION_S, JOINT, KneeMotion, KneeStage
-from ghest_rt.simulation.opensim_file import read_motion_table
-from ghest_rt.simulation.opensim_motion import OpenSimMotion
-from ghest_rt.simulation.optics import Imaging
-from ghest_rt.simulation.posture import Motion
-from ghest_rt.simulation.sensors import find_sensors
-from ghest_rt.simulation.soft_tissue import find_soft_tissue
+from ghest_rt.simulation.building import stage_world
+from ghest_rt.simulation.faults import FaultyDevices
+from ghest_rt.simulation.options import SimulateOptions
 from ghest_rt.simulation.staged import StagedWorld
-from ghest_rt.simulation.texture import MarkerTexture
-from ghest_rt.simulation.therapy import TherapyMotion, find_movement
-from ghest_rt.simulation.timeline import Timeline
-from ghest_rt.simulation.world import World
 
 _LOOK_AHEAD = 6
-_STATIONS = {
-    ("paper", "right"): "station-sim.toml",
-    ("paper", "left"): "station-sim-left.toml",
-    ("sr300", "right"): "station-sr300-sim.toml",
-    ("sr300", "left"): "station-sr300-sim-left.toml",
-}
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SimulateOptions:
-    """What to simulate.
-
-    Attributes:
-        out: The recording to write.
-        movement: A movement of Table 2 by name, or None with `motion`.
-        motion: An OpenSim motion file, or None with `movement`.
-        sensor: "paper" or "sr300".
-        seed: The same seed gives the same bytes.
-        duration_s: How much of the movement; None for all of it.
-        arm: Which arm.
-        height_m: The patient's height.
-        marker: What is printed on the marker plates.
-        brightness: Factor on the light in the room.
-        white_balance: Factors on red, green and blue.
-        station: A station file of your own; None for the shipped one of this sensor and arm.
-        marker_moves: Markers that are not where the calibration says.
-        soft_tissue: How skin moves the markers.
-        faults: What the devices fail to deliver.
-        color_only: Cameras without depth; the recording's station file says so.
-        calibration_reference: The station file has what a calibration session saw besides the markers.
-        imaging: What goes wrong with the colour images.
-    """
-
-    out: Path
-    movement: str | None = None
-    motion: Path | None = None
-    sensor: Literal["paper", "sr300"] = "paper"
-    seed: int = 0
-    duration_s: float | None = None
-    arm: Literal["right", "left"] = "right"
-    height_m: float = 1.75
-    marker: MarkerTexture = "disks"
-    brightness: float = 1.0
-    white_balance: tuple[float, float, float] = (1.0, 1.0, 1.0)
-    station: Path | None = None
-    marker_moves: tuple[MarkerMove, ...] = ()
-    soft_tissue: SoftTissueName = "none"
-    faults: tuple[DeviceFault, ...] = ()
-    color_only: bool = False
-    calibration_reference: bool = False
-    imaging: Imaging = field(default_factory=Imaging)
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,78 +39,6 @@ class SimulationSummary:
     encoder_samples: int
     truth_samples: int
     size_bytes: int
-
-
-def stage_world(options: SimulateOptions) -> StagedWorld:
-    """Set up what `options` describe (`out` and `faults` are not used): the clinic, or the knee if the station measures one.
-
-    Raises:
-        BadInputError: An option, the station file or the motion file cannot be used.
-        GhestError: The exoskeleton cannot follow the movement.
-    """
-    if options.station is not None:
-        station = load_station(options.station)
-        if station.config.joint.name == JOINT:
-            return _knee_world(options, station)
-    return build_world(options)
-
-
-def build_world(options: SimulateOptions) -> World:
-    """Set up the simulated clinic that `options` describe (`out` and `faults` are not used).
-
-    Raises:
-        BadInputError: An option, the station file or the motion file cannot be used.
-        GhestError: The exoskeleton cannot follow the movement.
-    """
-    if not 0 <= options.seed < 1 << 63:
-        raise BadInputError(f"seed {options.seed}: give a number that is not negative")
-    if min(options.brightness, *options.white_balance) <= 0:
-        raise BadInputError("brightness and white balance are factors: give positive numbers")
-    sensors = find_sensors(options.sensor)
-    body = anatomy(options.height_m)
-    station = fit_station(_station(options), body)
-    if options.color_only:
-        station = without_depth(station)
-    if station.config.station.arm != options.arm:
-        raise BadInputError(
-            f"{station.source}: station.arm is {station.config.station.arm}, asked for is the {options.arm} arm; "
-            f"use --arm {station.config.station.arm} or another station file"
-        )
-    motion = _motion(options)
-    if options.calibration_reference:
-        station = with_reference(station, body, options.seed, motion.name)
-    return World(
-        station,
-        body,
-        motion,
-        sensors,
-        seed=options.seed,
-        texture=options.marker,
-        light=Light(options.brightness, options.white_balance),
-        duration_s=options.duration_s,
-        marker_moves=options.marker_moves,
-        soft_tissue=find_soft_tissue(options.soft_tissue),
-        imaging=options.imaging,
-    )
-
-
-def _knee_world(options: SimulateOptions, station: LoadedStation) -> StagedWorld:
-    """Set up the example of another limb, config/examples/knee."""
-    if options.marker_moves or options.soft_tissue != "none" or options.motion is not None:
-        raise BadInputError("the simulated knee has one movement, no marker shifts and no soft tissue; leave these options out")
-    if options.color_only:
-        station = without_depth(station)
-    return StagedWorld(
-        station,
-        KneeStage(station, KneeMotion.from_seed(options.seed)),
-        find_sensors(options.sensor),
-        Timeline(DURATION_S if options.duration_s is None else min(options.duration_s, DURATION_S)),
-        motion_name=JOINT,
-        seed=options.seed,
-        texture=options.marker,
-        light=Light(options.brightness, options.white_balance),
-        imaging=options.imaging,
-    )
 
 
 def simulate(options: SimulateOptions, progress: Callable[[float], None]) -> SimulationSummary:
@@ -302,20 +161,6 @@ def _disturbances(options: SimulateOptions) -> dict[str, str]:
         "image": list(options.imaging.texts),
     }
     return {name: " ".join(texts) for name, texts in given.items() if texts}
-
-
-def _station(options: SimulateOptions) -> LoadedStation:
-    if options.station is not None:
-        return load_station(options.station)
-    return load_station(shipped_config_dir() / _STATIONS[options.sensor, options.arm])
-
-
-def _motion(options: SimulateOptions) -> Motion:
-    if options.movement is not None and options.motion is None:
-        return TherapyMotion(find_movement(options.movement), options.seed)
-    if options.motion is not None and options.movement is None:
-        return OpenSimMotion(read_motion_table(options.motion), options.motion.stem)
-    raise BadInputError("give either a movement (--movement) or a motion file (--motion)")
 
 
 def _command(options: SimulateOptions, motion_name: str) -> str:

@@ -14,8 +14,9 @@ from ghest_rt.errors import BadInputError
 from ghest_rt.estimation.pipeline import Pipeline
 from ghest_rt.messages.results import Reason, Status
 from ghest_rt.recording.reader import Recording
-from ghest_rt.simulation.command import SimulateOptions, simulate
+from ghest_rt.simulation.command import simulate
 from ghest_rt.simulation.faults import parse_fault
+from ghest_rt.simulation.options import SimulateOptions
 from ghest_rt.studies.score import run_with_truth, score_recording
 
 OPTIONS = SimulateOptions(out=Path(), movement="SFE", duration_s=0.8, seed=21)

@@ -13,7 +13,8 @@ from ghest_rt.estimation.offline import estimate_events
 from ghest_rt.estimation.pipeline import Pipeline
 from ghest_rt.messages.results import Reason, Status
 from ghest_rt.recording.reader import Recording
-from ghest_rt.simulation.command import SimulateOptions, simulate
+from ghest_rt.simulation.command import simulate
+from ghest_rt.simulation.options import SimulateOptions
 
 
 @pytest.fixture(scope="module")

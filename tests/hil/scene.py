@@ -89,7 +89,8 @@ def write_scene(folder: Path, epoch_ns: int) -> None:
     from dataclasses import replace
 
     from ghest_rt.config.shipped import shipped_config_dir
-    from ghest_rt.simulation.command import SimulateOptions, build_world
+    from ghest_rt.simulation.building import build_world
+    from ghest_rt.simulation.options import SimulateOptions
     from ghest_rt.simulation.sensors import PAPER, SENSOR_SETS, SensorSet
 
     camera = replace(

@@ -8,7 +8,8 @@ import pytest
 
 pytest.importorskip("mujoco", reason="needs the extra sim")
 
-from ghest_rt.simulation.command import SimulateOptions, simulate
+from ghest_rt.simulation.command import simulate
+from ghest_rt.simulation.options import SimulateOptions
 from ghest_rt.studies.score import run_with_truth, score_recording
 
 

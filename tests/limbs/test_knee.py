@@ -13,8 +13,9 @@ from ghest_rt.errors import BadInputError
 from ghest_rt.estimation.angles import clinical, euler_yxz, signs_of
 from ghest_rt.messages.results import Status
 from ghest_rt.service.compose import AnglesComposer, Numbering
-from ghest_rt.simulation.command import SimulateOptions, simulate
+from ghest_rt.simulation.command import simulate
 from ghest_rt.simulation.disturbances import parse_shift
+from ghest_rt.simulation.options import SimulateOptions
 from ghest_rt.studies.score import JudgedRun, run_with_truth, score_recording
 
 STATION = shipped_config_dir() / "examples" / "knee" / "station.toml"

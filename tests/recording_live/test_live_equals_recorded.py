@@ -24,7 +24,8 @@ from ghest_rt.service.recorder import Recorder
 from ghest_rt.service.recorder_parts import Parts
 from ghest_rt.service.recorder_settings import RecorderSettings
 from ghest_rt.service.recorder_taps import RecordedCamera, RecordedEncoders, RecorderOutput
-from ghest_rt.simulation.command import SimulateOptions, simulate
+from ghest_rt.simulation.command import simulate
+from ghest_rt.simulation.options import SimulateOptions
 from tests.recording_live.conftest import STARTED_UNIX_NS
 from tests.service.fakes import Collector
 

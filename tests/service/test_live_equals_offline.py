@@ -18,7 +18,8 @@ from ghest_rt.service.compose import AnglesComposer, Numbering
 from ghest_rt.service.contract import ServiceSettings
 from ghest_rt.service.inputs import InputSettings
 from ghest_rt.service.loop import Service
-from ghest_rt.simulation.command import SimulateOptions, simulate
+from ghest_rt.simulation.command import simulate
+from ghest_rt.simulation.options import SimulateOptions
 from tests.service.fakes import Collector
 
 PATIENT_LAG_NS = 400_000_000  # so that a busy machine loses no frame; the angles do not depend on it

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from ghest_rt.simulation.command import SimulateOptions, build_world
+from ghest_rt.simulation.building import build_world
+from ghest_rt.simulation.options import SimulateOptions
 from ghest_rt.simulation.world import World
 
 

@@ -11,7 +11,8 @@ from ghest_drivers.samples import EncoderSample, RgbdFrame
 from ghest_rt.errors import BadInputError
 from ghest_rt.messages.results import TruthSample
 from ghest_rt.recording.reader import Recording
-from ghest_rt.simulation.command import SimulateOptions, simulate
+from ghest_rt.simulation.command import simulate
+from ghest_rt.simulation.options import SimulateOptions
 
 
 def options(path: Path, **more: object) -> SimulateOptions:

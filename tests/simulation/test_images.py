@@ -14,7 +14,8 @@ from ghest_rt.config.load import load_station
 from ghest_rt.config.shipped import shipped_config_dir
 from ghest_rt.geometry.se3 import inverse
 from ghest_rt.simulation.anatomy import anatomy
-from ghest_rt.simulation.command import SimulateOptions, build_world
+from ghest_rt.simulation.building import build_world
+from ghest_rt.simulation.options import SimulateOptions
 from ghest_rt.simulation.rays import PixelRays
 from ghest_rt.simulation.scene import exoskeleton_spec
 from ghest_rt.simulation.sensors import PAPER, SENSOR_SETS, SR300

@@ -10,8 +10,9 @@ import pytest
 from ghest_rt.geometry.se3 import inverse
 from ghest_rt.geometry.so3 import angle_between_rad, log_so3, rot_z
 from ghest_rt.messages.results import TruthSample
-from ghest_rt.simulation.command import SimulateOptions, build_world
+from ghest_rt.simulation.building import build_world
 from ghest_rt.simulation.disturbances import parse_shift, parse_turn
+from ghest_rt.simulation.options import SimulateOptions
 from ghest_rt.simulation.world import World
 
 

@@ -8,9 +8,10 @@ import pytest
 
 from ghest_drivers.samples import EncoderSample, RgbdFrame
 from ghest_rt.recording.reader import Recording
-from ghest_rt.simulation.command import SimulateOptions, SimulationSummary, simulate
+from ghest_rt.simulation.command import SimulationSummary, simulate
 from ghest_rt.simulation.disturbances import parse_shift, parse_turn
 from ghest_rt.simulation.faults import parse_fault
+from ghest_rt.simulation.options import SimulateOptions
 from ghest_rt.studies.score import score_recording
 
 START_NS = 300_300_300  # of the movement: 20 periods of 66.6 Hz

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from ghest_rt.errors import BadInputError
-from ghest_rt.simulation.command import SimulateOptions, simulate
+from ghest_rt.simulation.command import simulate
 from ghest_rt.simulation.disturbances import parse_shift
+from ghest_rt.simulation.options import SimulateOptions
 from ghest_rt.studies.observing.observed import observe
 from ghest_rt.studies.observing.packing import pack, unpack
 from ghest_rt.studies.observing.scenario import MountError, Scenario, motion_file

@@ -9,7 +9,8 @@ import pytest
 
 from ghest_rt.geometry.so3 import rot_x, rot_y, rot_z
 from ghest_rt.simulation.anatomy import anatomy
-from ghest_rt.simulation.command import SimulateOptions, build_world
+from ghest_rt.simulation.building import build_world
+from ghest_rt.simulation.options import SimulateOptions
 from ghest_rt.simulation.posture import Motion, Posture
 from ghest_rt.simulation.sensors import find_sensors
 from ghest_rt.simulation.world import World

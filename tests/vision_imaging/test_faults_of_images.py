@@ -10,8 +10,9 @@ from typer.testing import CliRunner
 from ghest_rt.cli.main import app
 from ghest_rt.errors import BadInputError
 from ghest_rt.recording.reader import Recording
-from ghest_rt.simulation.command import SimulateOptions, build_world
+from ghest_rt.simulation.building import build_world
 from ghest_rt.simulation.optics import parse_imaging
+from ghest_rt.simulation.options import SimulateOptions
 from ghest_rt.simulation.world import World
 
 

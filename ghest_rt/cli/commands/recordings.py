@@ -70,10 +70,10 @@ def simulate(
 
     need_extra("sim", "a simulated patient")
     from ghest_rt.cli.simulate import simulate_recording
-    from ghest_rt.simulation.command import SimulateOptions
     from ghest_rt.simulation.disturbances import parse_shift, parse_turn
     from ghest_rt.simulation.faults import parse_fault
     from ghest_rt.simulation.optics import parse_imaging
+    from ghest_rt.simulation.options import SimulateOptions
 
     shifts, turns = map(parse_shift, marker_shift or ()), map(parse_turn, marker_turn or ())
     simulate_recording(

@@ -8,10 +8,11 @@ from pydantic import Field
 
 from ghest_rt.config.strict import Strict
 from ghest_rt.errors import BadInputError
-from ghest_rt.simulation.command import SimulateOptions, build_world
+from ghest_rt.simulation.building import build_world
 from ghest_rt.simulation.disturbances import SoftTissueName, parse_shift, parse_turn
 from ghest_rt.simulation.opensim_file import read_motion_table
 from ghest_rt.simulation.opensim_motion import OpenSimMotion
+from ghest_rt.simulation.options import SimulateOptions
 from ghest_rt.simulation.posture import Motion
 from ghest_rt.simulation.texture import MarkerTexture
 from ghest_rt.simulation.therapy import TherapyMotion, find_movement
