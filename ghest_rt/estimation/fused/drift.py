@@ -18,7 +18,6 @@ from ghest_rt.estimation.fused.answers import (
     Explained,
 )
 from ghest_rt.estimation.fused.belief import ACROMION, ARM, GH, POSES, Base, Belief
-from ghest_rt.estimation.fused.reference import NO_EVIDENCE, Evidence
 from ghest_rt.estimation.fused.tuning import Tuning
 from ghest_rt.estimation.fused.weighing import Weighing
 from ghest_rt.geometry.se3 import transform
@@ -41,6 +40,27 @@ _FROM_DRIFT = np.eye(_POSTURE, DRIFT_SIZE, -_BONES)
 _DOUBTFUL = 1e-2
 # A marker that has jumped is back if it is within this of where it was.
 _BACK_M, _BACK_RAD = 0.003, math.radians(1.0)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Evidence:
+    """What is told of m1 besides where the GH centre is in it; axes of m1 as calibrated; None where it is not known.
+
+    Attributes:
+        elbow_moved: (3,) how far the elbow, as m1 shows it, has moved in camera r1 since the beginning, m.
+        elbow_moved_m2: Variance of that without drift, per axis.
+        first_elbow: (3,) how far it was displaced there during the first seconds, against the calibration session, m.
+        first_elbow_m2: Variance of that without drift, per axis.
+        twist_rad: How far m1 has turned about the arm's axis (elbow to GH centre) since the calibration, by the forearm.
+        twist_rad2: Variance of that without a turn.
+    """
+
+    elbow_moved: Array | None
+    elbow_moved_m2: float
+    first_elbow: Array | None
+    first_elbow_m2: float
+    twist_rad: float | None
+    twist_rad2: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -78,21 +98,12 @@ class DriftJudge:
         self._weighing = Weighing(self._answers)
         self._doubt = np.zeros((_POSTURE, _POSTURE))
 
-    def judge(
-        self,
-        belief: Belief,
-        elbow_moved: Array | None = None,
-        elbow_m2: float = 0.0,
-        evidence: Evidence = NO_EVIDENCE,
-    ) -> Posture:
+    def judge(self, belief: Belief, evidence: Evidence) -> Posture:
         """Return the bones as the mean over the answers, with the covariance of the mixture.
 
         Args:
             belief: The belief.
-            elbow_moved: (3,) how far the elbow, as m1 shows it, has moved in camera r1 since the beginning; axes of m1 as
-                calibrated, m. None if that is not known.
-            elbow_m2: Variance of that per axis without any drift.
-            evidence: What differs from the calibration session.
+            evidence: What is told of m1 besides.
         """
         explained = self._answers.explained(belief)
         found = np.zeros(ROWS)
@@ -101,8 +112,8 @@ class DriftJudge:
         variance = np.full(ROWS, _ANYTHING)
         for rows, value, known in (
             (TWIST, evidence.twist_rad, evidence.twist_rad2),
-            (ELBOW, elbow_moved, elbow_m2),
-            (FIRST_ELBOW, evidence.elbow, evidence.elbow_m2),
+            (ELBOW, evidence.elbow_moved, evidence.elbow_moved_m2),
+            (FIRST_ELBOW, evidence.first_elbow, evidence.first_elbow_m2),
         ):
             if value is not None:
                 found[rows], variance[rows] = value, known
@@ -110,7 +121,7 @@ class DriftJudge:
         P[:_BELIEVED, :_BELIEVED] = belief.P[:_BELIEVED, :_BELIEVED]
         P[_TOLD, _TOLD] = np.diag(variance[6:])
         weighing = self._weighing
-        anew = weighing.weigh(belief.t_ns, P[_FOUND, _FOUND], explained, found, elbow_known=elbow_moved is not None)
+        anew = weighing.weigh(belief.t_ns, P[_FOUND, _FOUND], explained, found, elbow_known=evidence.elbow_moved is not None)
         weights = weighing.probability
         kept = np.flatnonzero(weights)
         postures = [self._posture(belief, P, explained, int(h), found) for h in kept]

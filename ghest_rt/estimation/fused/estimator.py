@@ -133,7 +133,7 @@ class FusedEstimator:
         belief = known.copy()
         self._forecast(belief, t_ns, joints)
         stale = self._freshness.stale(belief.seen_ns, t_ns)
-        posture = self._judge.judge(belief, *self._witness.elbow_moved(belief), self._witness.evidence(belief))
+        posture = self._judge.judge(belief, self._witness.evidence(belief))
         e_from_arm = step3_4_5_e_from_arm(posture.e_from_gh, posture.e_from_elw)
         newest_ns = {**self._inputs.newest_ns, "r0": belief.seen_ns[0], "r1": belief.seen_ns[1], "encoders": joints.newest_ns}
         if e_from_arm is None:

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from ghest_rt.config.station import Calibration
-from ghest_rt.estimation.fused.belief import Belief
 from ghest_rt.geometry.so3 import Array
 
 
@@ -43,38 +42,3 @@ class Reference:
             forearm_rad=None if said.forearm_twist_deg is None else math.radians(said.forearm_twist_deg),
             forearm_sigma_rad=math.radians(said.forearm_sigma_deg),
         )
-
-    def evidence(self, belief: Belief, first_elbow: Array | None, twist: tuple[float, float] | None) -> "Evidence":
-        """Return how this session differs.
-
-        Args:
-            belief: The belief.
-            first_elbow: (3,) the elbow in camera r1 during the first seconds, m; None before there is any.
-            twist: How far m1 has turned about the arm by the forearm, and the variance of that; rad, rad^2.
-        """
-        elbow = None
-        if self.elbow_m is not None and first_elbow is not None:
-            in_e = belief.e_from_r1[:3, :3] @ (first_elbow - self.elbow_m)
-            elbow = np.asarray(belief.base[1].turn @ (belief.e_from_marker[1].T @ in_e))
-        return Evidence(elbow, self.elbow_sigma_m**2, *(twist or (None, 0.0)))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Evidence:
-    """How this session differs from the calibration session.
-
-    Attributes:
-        elbow: (3,) how far the elbow, as m1 shows it, was displaced in camera r1 during the first seconds, axes of m1 as
-            calibrated, m; or None.
-        elbow_m2: Variance of that without drift, per axis.
-        twist_rad: How far m1 has turned about the arm's axis (elbow to GH centre) by the forearm; or None.
-        twist_rad2: Variance of that without a turn.
-    """
-
-    elbow: Array | None = None
-    elbow_m2: float = 0.0
-    twist_rad: float | None = None
-    twist_rad2: float = 0.0
-
-
-NO_EVIDENCE = Evidence()

@@ -5,7 +5,8 @@ import numpy as np
 from ghest_rt.estimation.arm_chain import ArmChain
 from ghest_rt.estimation.fused.axial import AxialJudge, Slip, twist_rad
 from ghest_rt.estimation.fused.belief import Belief
-from ghest_rt.estimation.fused.reference import Evidence, Reference
+from ghest_rt.estimation.fused.drift import Evidence
+from ghest_rt.estimation.fused.reference import Reference
 from ghest_rt.estimation.fused.settled import Settled
 from ghest_rt.estimation.fused.sighting import Sighting
 from ghest_rt.estimation.fused.tuning import Tuning
@@ -68,22 +69,18 @@ class Witness:
         gh_from_arm = gh_from_e @ elw_from_e.T @ _ELW_FROM_ARM
         self._axial.add(sighting.t_ns, elw_from_e @ forearm, twist_rad(gh_from_arm))
 
-    def elbow_moved(self, belief: Belief) -> tuple[Array | None, float]:
-        """Return how far the elbow, as m1 shows it, has moved in camera r1, and the variance of that without any drift.
-
-        It wanders with the arm's attitude in r1: its axis and the exoskeleton's are apart.
-
-        Returns:
-            (3,) axes of m1 as calibrated, m, or None before that is known; m^2 per axis.
-        """
-        if not self._elbow.ready:
-            return None, 0.0
-        moved = self._elbow.recent - self._elbow.first
-        in_e = belief.e_from_r1[:3, :3] @ moved[:3]
-        variance = self._tuning.elbow_m**2 + self._tuning.elbow_lever_m**2 * float(moved[3:] @ moved[3:])
-        return np.asarray(belief.base[1].turn @ (belief.e_from_marker[1].T @ in_e)), variance
-
     def evidence(self, belief: Belief) -> Evidence:
-        """Return how this session differs from the calibration session."""
-        first = self._elbow.first[:3] if self._elbow.started else None
-        return self._reference.evidence(belief, first, self._axial.turned())
+        """Return what is told of m1, in its axes as calibrated."""
+        marker_from_r1 = belief.base[1].turn @ belief.e_from_marker[1].T @ belief.e_from_r1[:3, :3]
+        elbow, reference = self._elbow, self._reference
+        moved = first = None
+        moved_m2 = 0.0
+        if elbow.ready:
+            # It wanders with the arm's attitude in r1: the arm's axis and the exoskeleton's are apart.
+            apart = elbow.recent - elbow.first
+            moved = marker_from_r1 @ apart[:3]
+            moved_m2 = self._tuning.elbow_m**2 + self._tuning.elbow_lever_m**2 * float(apart[3:] @ apart[3:])
+        if elbow.started and reference.elbow_m is not None:
+            first = marker_from_r1 @ (elbow.first[:3] - reference.elbow_m)
+        twist_rad, twist_rad2 = self._axial.turned() or (None, 0.0)
+        return Evidence(moved, moved_m2, first, reference.elbow_sigma_m**2, twist_rad, twist_rad2)
