@@ -1,5 +1,7 @@
 """The simulated clinic, or the knee, set up as options describe it."""
 
+from pathlib import Path
+
 from ghest_rt.config.load import LoadedStation, load_station
 from ghest_rt.config.shipped import shipped_config_dir
 from ghest_rt.errors import BadInputError
@@ -62,7 +64,7 @@ def build_world(options: SimulateOptions) -> World:
             f"{station.source}: station.arm is {station.config.station.arm}, asked for is the {options.arm} arm; "
             f"use --arm {station.config.station.arm} or another station file"
         )
-    motion = _motion(options)
+    motion = motion_of(options.movement, options.motion, options.seed)
     if options.calibration_reference:
         station = with_reference(station, body, options.seed, motion.name)
     return World(
@@ -105,9 +107,19 @@ def _station(options: SimulateOptions) -> LoadedStation:
     return load_station(shipped_config_dir() / _STATIONS[options.sensor, options.arm])
 
 
-def _motion(options: SimulateOptions) -> Motion:
-    if options.movement is not None and options.motion is None:
-        return TherapyMotion(find_movement(options.movement), options.seed)
-    if options.motion is not None and options.movement is None:
-        return OpenSimMotion(read_motion_table(options.motion), options.motion.stem)
+def motion_of(movement: str | None, file: Path | None, seed: int) -> Motion:
+    """Return a movement of Table 2, or that of an OpenSim motion file.
+
+    Args:
+        movement: Its name, or None with `file`.
+        file: The file, or None with `movement`.
+        seed: Of a movement of Table 2.
+
+    Raises:
+        BadInputError: Both are given or none, the movement is unknown, or the file cannot be used.
+    """
+    if movement is not None and file is None:
+        return TherapyMotion(find_movement(movement), seed)
+    if file is not None and movement is None:
+        return OpenSimMotion(read_motion_table(file), file.stem)
     raise BadInputError("give either a movement (--movement) or a motion file (--motion)")

@@ -8,14 +8,12 @@ from pydantic import Field
 
 from ghest_rt.config.strict import Strict
 from ghest_rt.errors import BadInputError
-from ghest_rt.simulation.building import build_world
+from ghest_rt.simulation.building import build_world, motion_of
 from ghest_rt.simulation.disturbances import SoftTissueName, parse_shift, parse_turn
-from ghest_rt.simulation.opensim_file import read_motion_table
-from ghest_rt.simulation.opensim_motion import OpenSimMotion
 from ghest_rt.simulation.options import SimulateOptions
 from ghest_rt.simulation.posture import Motion
 from ghest_rt.simulation.texture import MarkerTexture
-from ghest_rt.simulation.therapy import TherapyMotion, find_movement
+from ghest_rt.simulation.therapy import find_movement
 from ghest_rt.simulation.world import World
 from ghest_rt.vision.station import Method
 
@@ -85,10 +83,7 @@ class Scenario(Strict):
             BadInputError: The movement is unknown, or the motion file cannot be used or is not what it was.
         """
         self._check_file()
-        if self.motion is None:
-            return TherapyMotion(find_movement(self.movement or ""), self.seed)
-        path = Path(self.motion.path)
-        return OpenSimMotion(read_motion_table(path), path.stem)
+        return motion_of(self.movement, self._motion_path(), self.seed)
 
     def world(self, marker: MarkerTexture = "disks") -> World:
         """Set up the simulated clinic.
@@ -104,7 +99,7 @@ class Scenario(Strict):
             SimulateOptions(
                 out=Path(),
                 movement=self.movement,
-                motion=None if self.motion is None else Path(self.motion.path),
+                motion=self._motion_path(),
                 sensor=self.sensor,
                 seed=self.seed,
                 height_m=HEIGHT_M,
@@ -114,6 +109,9 @@ class Scenario(Strict):
                 marker=marker,
             )
         )
+
+    def _motion_path(self) -> Path | None:
+        return None if self.motion is None else Path(self.motion.path)
 
     def _check_file(self) -> None:
         if self.motion is not None and motion_file(Path(self.motion.path)) != self.motion:
