@@ -1,5 +1,6 @@
 """In place of an OAK device: queues into the same Sync node, on the SDK's own pipeline."""
 
+import threading
 from datetime import timedelta
 from typing import Any
 
@@ -53,7 +54,8 @@ class HostSource:
         if settings.depth:
             self.depth = sync.inputs["depth"].createInputQueue()
         self.started = dai.Clock.now()
-        self.send(0, streams="cd" if settings.depth else "c")
+        # Like a device's, its images come after the start: with some in its queues already, the SDK now and then hangs there.
+        threading.Timer(0.02, self.send, (0,), {"streams": "cd" if settings.depth else "c"}).start()
         return Images(pipeline, "OAK-D-SR", "1844"), sync
 
     def send(self, k: int, *, skew: timedelta = timedelta(), streams: str = "cd") -> None:
