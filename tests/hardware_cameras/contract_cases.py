@@ -69,7 +69,9 @@ def oak_camera(silent: bool) -> Iterator[RgbdCamera]:
     source = HostSource()
 
     def send(k: int) -> None:
-        with contextlib.suppress(AttributeError, dai.MessageQueue.QueueException):  # not open, or closed
+        if not source.live.is_set():
+            return
+        with contextlib.suppress(dai.MessageQueue.QueueException):  # closed meanwhile
             now = dai.Clock.now()
             source.color.send(image(color_of(0), k, now))
             source.depth.send(image(depth_of(0), k, now))

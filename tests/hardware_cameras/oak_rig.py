@@ -13,6 +13,7 @@ from ghest_drivers.hardware.oak.source import Images
 WIDTH, HEIGHT = 64, 48
 SETTINGS = OakSettings(width_px=WIDTH, height_px=HEIGHT, rate_hz=60, queue_frames=16)
 PERIOD = timedelta(microseconds=16_667)
+_START_S = 0.02  # the pipeline says that it runs before all its nodes do
 MATRIX = [[60.0, 0.0, 31.5], [0.0, 61.0, 23.5], [0.0, 0.0, 1.0]]
 
 
@@ -42,10 +43,19 @@ def depth_of(k: int) -> Any:
 
 
 class HostSource:
-    """In place of a device: queues into the same Sync node."""
+    """In place of a device: queues into the same Sync node.
+
+    Like a device's, its first image comes after the pipeline has started: with some waiting, the start now and then hangs.
+
+    Attributes:
+        live: Set from the first image until it is released.
+    """
 
     def __init__(self) -> None:
         self.released = 0
+        self.live = threading.Event()
+        self._released = threading.Event()
+        self._beginning: threading.Thread | None = None
 
     def connect(self, settings: OakSettings) -> tuple[Images, Any]:
         pipeline = dai.Pipeline(createImplicitDevice=False)
@@ -54,9 +64,17 @@ class HostSource:
         if settings.depth:
             self.depth = sync.inputs["depth"].createInputQueue()
         self.started = dai.Clock.now()
-        # Like a device's, its images come after the start: with some in its queues already, the SDK now and then hangs there.
-        threading.Timer(0.02, self.send, (0,), {"streams": "cd" if settings.depth else "c"}).start()
+        self._released.clear()
+        self._beginning = threading.Thread(target=self._begin, args=(pipeline, "cd" if settings.depth else "c"))
+        self._beginning.start()
         return Images(pipeline, "OAK-D-SR", "1844"), sync
+
+    def _begin(self, pipeline: Any, streams: str) -> None:
+        while not self._released.wait(_START_S):
+            if pipeline.isRunning():
+                self.send(0, streams=streams)
+                self.live.set()
+                return
 
     def send(self, k: int, *, skew: timedelta = timedelta(), streams: str = "cd") -> None:
         t = self.started + k * PERIOD - timedelta(milliseconds=100)
@@ -69,4 +87,8 @@ class HostSource:
         return 41.0
 
     def release(self) -> None:
+        self.live.clear()
+        self._released.set()
+        if self._beginning is not None:
+            self._beginning.join()
         self.released += 1

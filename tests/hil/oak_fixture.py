@@ -38,7 +38,7 @@ def here(*, name: str, clock: Clock, mxid: str, **streams: Any) -> RgbdCamera:
         """In place of the nodes that run on a device."""
 
         def connect(self, settings: OakSettings) -> tuple[Images, Any]:
-            pipeline = dai.Pipeline(createImplicitDevice=False)
+            self.pipeline = pipeline = dai.Pipeline(createImplicitDevice=False)
             sync = pipeline.create(dai.node.Sync)
             self.color = sync.inputs["color"].createInputQueue()
             self.depth = sync.inputs["depth"].createInputQueue()
@@ -46,6 +46,8 @@ def here(*, name: str, clock: Clock, mxid: str, **streams: Any) -> RgbdCamera:
             return Images(pipeline, "OAK-D-SR", mxid), sync
 
         def send(self, view: str, index: int, number: int, t_ns: int) -> None:
+            if not self.pipeline.isRunning():  # images that wait while it starts may make the SDK hang
+                return
             stamp = timedelta(microseconds=t_ns / 1000)  # the SDK's host clock is CLOCK_MONOTONIC as well
             self.color.send(image(scene.color[view][index], dai.ImgFrame.Type.RGB888i, number, stamp))
             self.depth.send(image(scene.depth[view][index], dai.ImgFrame.Type.RAW16, number, stamp))
