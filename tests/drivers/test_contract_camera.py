@@ -2,15 +2,15 @@
 
 import contextlib
 import itertools
-import threading
 from typing import Any
 
 import pytest
 
 from ghest_drivers.clock import MonotonicClock
-from ghest_drivers.errors import DeviceLost, DriverError, EndOfStream, ReadTimeout
+from ghest_drivers.errors import DeviceLost, EndOfStream, ReadTimeout
 from ghest_drivers.interfaces import RgbdCamera
 from ghest_drivers.samples import RgbdFrame
+from tests.drivers.blocked_call import BlockedCall
 
 _FRAMES = 5
 _LONG_S = 20.0
@@ -105,21 +105,10 @@ def test_closing_is_harmless_at_any_time(camera: RgbdCamera) -> None:
 def test_closing_wakes_a_blocked_read(silent_camera: RgbdCamera) -> None:
     silent_camera.open()
     _exhaust(silent_camera)
-    raised: list[DriverError] = []
-
-    def read() -> None:
-        try:
-            silent_camera.read(50.0)
-        except DriverError as error:
-            raised.append(error)
-
-    reader = threading.Thread(target=read)
-    reader.start()
-    reader.join(0.1)
-    assert reader.is_alive(), "the read should block"
+    reader = BlockedCall(lambda: silent_camera.read(50.0))
+    assert reader.blocks(0.1)
     silent_camera.close()
-    reader.join(10.0)
-    assert [type(error) for error in raised] == [DeviceLost]
+    assert type(reader.error(10.0)) is DeviceLost
 
 
 def test_it_streams_again_after_reopening(camera: RgbdCamera) -> None:

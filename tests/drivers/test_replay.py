@@ -11,6 +11,7 @@ from ghest_drivers.clock import Clock, MonotonicClock, VirtualClock
 from ghest_drivers.errors import DeviceLost, DeviceNotFound, EndOfStream
 from ghest_drivers.replay import ReplayPlayer
 from ghest_drivers.samples import CameraInfo, EncoderInfo, EncoderSample, Intrinsics, RgbdFrame
+from tests.drivers.blocked_call import BlockedCall
 
 _INTRINSICS = Intrinsics(2, 2, 1, 1, 0.5, 0.5)
 _INFO = CameraInfo("r0", "test", "1", _INTRINSICS, _INTRINSICS, 0.001, np.eye(4), 60.0)
@@ -190,19 +191,9 @@ def test_closing_the_player_wakes_readers_and_ends_its_thread() -> None:
     camera = player.camera("r0")
     camera.open()
     camera.read(10.0)
-    raised: list[Exception] = []
-
-    def read() -> None:
-        try:
-            camera.read(50.0)
-        except DeviceLost as error:
-            raised.append(error)
-
-    reader = threading.Thread(target=read)
-    reader.start()
+    reader = BlockedCall(lambda: camera.read(50.0))
     player.close()
-    reader.join(10.0)
-    assert len(raised) == 1
+    assert type(reader.error(10.0)) is DeviceLost
     assert "replay-feeder" not in [thread.name for thread in threading.enumerate()]
     with pytest.raises(DeviceNotFound):
         camera.open()

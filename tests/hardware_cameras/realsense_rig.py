@@ -1,19 +1,23 @@
 """A software RealSense device with the driver on it, on a virtual host clock."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ghest_drivers.clock import VirtualClock
+from ghest_drivers.clock import MonotonicClock, VirtualClock
 from ghest_drivers.errors import ReadTimeout
 from ghest_drivers.hardware.realsense.camera import RealsenseCamera
 from ghest_drivers.hardware.realsense.settings import RealsenseSettings
-from ghest_drivers.hardware.realsense.software import SoftwareRealsense
+from ghest_drivers.hardware.realsense.software import SoftwareRealsense, write_bag
 from ghest_drivers.hardware.realsense.source import ConnectedDevice
 from ghest_drivers.hardware.realsense.timestamps import TimeDomain
 from ghest_drivers.samples import CameraInfo, Intrinsics, RgbdFrame
 
 PERIOD_NS = 16_666_667
+LONG_S = 20.0
 COLOR_FROM_DEPTH = np.array([[0, -1, 0, 0.025], [1, 0, 0, 0.001], [0, 0, 1, -0.002], [0, 0, 0, 1.0]])
 INFO = CameraInfo(
     "r0",
@@ -55,6 +59,11 @@ class Rig:
         if "c" in streams:
             self.device.send_color(color_of(k), 100 + k, t_device_ns, domain)
 
+    def send_in_time(self, k: int, *, streams: str = "dc") -> None:
+        """Send image `k` one period after the one before, by both clocks."""
+        self.clock.sleep_until_ns(6_000_000_000 + k * PERIOD_NS)
+        self.send(k, 1_000_000_000 + k * PERIOD_NS, streams=streams)
+
     def read_all(self) -> list[RgbdFrame]:
         frames = []
         while True:
@@ -62,3 +71,22 @@ class Rig:
                 frames.append(self.camera.read(0.0))
             except ReadTimeout:
                 return frames
+
+
+@contextmanager
+def opened(settings: RealsenseSettings = SETTINGS, **options: Any) -> Iterator[Rig]:
+    """A rig whose camera is open."""
+    rig = Rig(settings, **options)
+    rig.camera.open()
+    try:
+        yield rig
+    finally:
+        rig.camera.close()
+
+
+def record_bag(path: Path, start_ns: int, frames: int) -> Path:
+    """Have the SDK's recorder write a .bag file of so many frames, a period apart."""
+    times_ns = [start_ns + k * PERIOD_NS for k in range(frames)]
+    recorded = (RgbdFrame(INFO, k, color_of(k), depth_of(k), t, t, t, t) for k, t in enumerate(times_ns))
+    assert write_bag(path, INFO, recorded, MonotonicClock()) == frames
+    return path

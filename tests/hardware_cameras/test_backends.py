@@ -75,14 +75,9 @@ def test_an_absent_device_is_told_through_the_process_boundary(backend: str, dev
 
 @needs_realsense
 def test_a_recording_plays_through_the_supervisor_without_losing_a_frame(tmp_path: Path) -> None:
-    from ghest_drivers.hardware.realsense.software import write_bag
-    from ghest_drivers.samples import RgbdFrame
-    from tests.hardware_cameras.realsense_rig import INFO, PERIOD_NS, color_of, depth_of
+    from tests.hardware_cameras.realsense_rig import INFO, depth_of, record_bag
 
-    path = tmp_path / "recorded.bag"
-    times = [10**9 + k * PERIOD_NS for k in range(20)]
-    frames = (RgbdFrame(INFO, k, color_of(k), depth_of(k), t, t, t, t) for k, t in enumerate(times))
-    write_bag(path, INFO, frames, MonotonicClock())
+    path = record_bag(tmp_path / "recorded.bag", 10**9, 20)
     settings = settings_of(
         backend="realsense_bag",
         path=str(path),

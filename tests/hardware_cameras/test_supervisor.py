@@ -5,7 +5,6 @@ import re
 import signal
 import subprocess
 import sys
-import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -18,6 +17,7 @@ from ghest_drivers.errors import BadDeviceData, DeviceLost, DeviceNotFound, Driv
 from ghest_drivers.hardware.supervisor.camera import SupervisedCamera
 from ghest_drivers.hardware.supervisor.link import Limits
 from ghest_drivers.hardware.supervisor.protocol import BackendSpec
+from tests.drivers.blocked_call import BlockedCall
 
 _LONG_S = 30.0
 _LIMITS = Limits(open_s=30.0, first_frame_s=10.0, silence_s=0.4, close_s=0.5)
@@ -178,21 +178,10 @@ def test_a_failure_to_open_is_told_and_leaves_nothing_behind(on_open: str, kind:
 
 def test_closing_interrupts_an_open_that_hangs() -> None:
     with supervised(then="hang", on_open="hang") as camera:
-        raised: list[DriverError] = []
-
-        def opening() -> None:
-            try:
-                camera.open()
-            except DriverError as error:
-                raised.append(error)
-
-        thread = threading.Thread(target=opening)
-        thread.start()
-        thread.join(0.3)
-        assert thread.is_alive()
+        opening = BlockedCall(camera.open)
+        assert opening.blocks(0.3)
         camera.close()
-        thread.join(_LONG_S)
-        assert [type(error) for error in raised] == [DeviceLost]
+        assert type(opening.error(_LONG_S)) is DeviceLost
 
 
 def test_a_close_that_hangs_is_cut_short() -> None:

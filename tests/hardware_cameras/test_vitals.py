@@ -44,17 +44,14 @@ def test_a_supervised_camera_passes_on_what_its_process_says_and_adds_its_own(mo
 
 def test_a_realsense_tells_its_temperature_where_it_has_one() -> None:
     pytest.importorskip("pyrealsense2", reason="needs the extra realsense", exc_type=ImportError)
-    from tests.hardware_cameras.realsense_rig import PERIOD_NS, Rig
+    from tests.hardware_cameras.realsense_rig import PERIOD_NS, opened
 
     for options, expected in (({"depth_options": {"asic_temperature": (0.0, 100.0, 41.0)}}, 41.0), ({}, None)):
-        rig = Rig(**options)
-        rig.camera.open()
-        for k in range(3):
-            rig.clock.sleep_until_ns(6_000_000_000 + k * PERIOD_NS)
-            rig.send(k, 1_000_000_000 + k * PERIOD_NS)
-        rig.send(2, 1_000_000_000 + 2 * PERIOD_NS)  # once more: refused
-        rig.read_all()
-        vitals = rig.camera.vitals()
-        assert vitals.temperature_c == expected
-        assert vitals.refused["repeated"] >= 1
-        rig.camera.close()
+        with opened(**options) as rig:
+            for k in range(3):
+                rig.send_in_time(k)
+            rig.send(2, 1_000_000_000 + 2 * PERIOD_NS)  # once more: refused
+            rig.read_all()
+            vitals = rig.camera.vitals()
+            assert vitals.temperature_c == expected
+            assert vitals.refused["repeated"] >= 1
