@@ -4,8 +4,8 @@ from collections.abc import Iterator
 
 import pytest
 
-from tests.security.attacks import Target, attacked
 from tests.security.clinic import Clinic, make_clinic
+from tests.security.target import Target, attacked
 
 
 @pytest.fixture(scope="session")

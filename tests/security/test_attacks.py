@@ -4,7 +4,8 @@ from collections.abc import Callable
 
 import pytest
 
-from tests.security.attacks import ATTACKS, Outcome, Target
+from tests.security.attacks import ATTACKS
+from tests.security.target import Outcome, Target
 
 
 @pytest.mark.slow
