@@ -1,0 +1,82 @@
+"""What `ghest-rt doctor` says, and ends with."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from ghest_drivers.hardware.probe import ProbeResult
+from ghest_rt.cli.doctor import command
+from ghest_rt.cli.doctor.checklist import CHECKLIST
+from ghest_rt.cli.doctor.findings import exit_code, missing, note, ok
+from ghest_rt.cli.doctor.links import SerialPort
+from tests.doctor.stations import SR300, station_of
+
+_ROOT = Path(__file__).parents[2]
+
+
+def doctor(*arguments: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "ghest_rt.cli.main", "doctor", *arguments], capture_output=True, text=True, check=False
+    )
+
+
+def test_a_station_without_its_devices_ends_with_3_and_says_what_to_do(tmp_path: Path, station_text: str) -> None:
+    station_of(tmp_path, station_text)
+    done = doctor("--station", str(tmp_path / "station.toml"), "--json")
+    assert done.returncode == 3
+    assert "Traceback" not in done.stderr
+    answer = json.loads(done.stdout)
+    needed = {finding["check"]: finding for finding in answer["findings"] if finding["exit_code"] == 3}
+    assert {"camera r0", "camera r1", "encoders"} <= set(needed)
+    assert all(finding["remedy"] for finding in needed.values())
+    assert {item["id"] for item in answer["checklist"]} >= {"usb", "latency"}
+
+
+def test_it_prints_for_people_too(tmp_path: Path, station_text: str) -> None:
+    station_of(tmp_path, station_text)
+    done = doctor("--station", str(tmp_path / "station.toml"))
+    assert done.returncode == 3
+    assert "Not ready: " in done.stdout
+    assert "Traceback" not in done.stdout + done.stderr
+
+
+def test_a_bad_station_file_ends_with_2_and_the_rest_is_looked_at(tmp_path: Path) -> None:
+    path = tmp_path / "station.toml"
+    path.write_text("format = 1\nspeed = 3\n")
+    done = doctor("--station", str(path), "--json")
+    assert done.returncode == 2
+    findings = json.loads(done.stdout)["findings"]
+    assert "speed" in next(finding for finding in findings if finding["check"] == "station file")["detail"]
+    assert any(finding["check"] == "real-time priority" for finding in findings)
+
+
+def test_live_needs_a_station() -> None:
+    done = doctor("--live", "1")
+    assert done.returncode == 2
+    assert "--station" in done.stderr
+
+
+def test_ready_is_said_when_all_is_there(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setattr(command, "probe", lambda family: ProbeResult((SR300,) if family == "realsense" else ()))
+    monkeypatch.setattr(command, "usb_cameras", list)
+    monkeypatch.setattr(command, "serial_ports", lambda: [SerialPort("/dev/ttyUSB0", True)])
+    monkeypatch.setattr(command, "can_interfaces", list)
+    monkeypatch.setattr(command, "Publisher", lambda: SimpleNamespace(enabled=False, listen=()))
+    assert command.run_doctor(None, None, as_json=False) == 0
+    assert "Ready." in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(("codes", "expected"), [([], 0), ([0, 0], 0), ([1, 3, 0], 3), ([3, 2, 1], 2), ([0, 1], 1)])
+def test_the_gravest_finding_sets_the_exit_code(codes: list[int], expected: int) -> None:
+    assert exit_code([missing("x", "y", "z", code) for code in codes]) == expected
+    assert exit_code([ok("x", "y"), note("x", "y")]) == 0
+
+
+def test_the_checklist_is_explained_in_the_documentation() -> None:
+    text = (_ROOT / "docs" / "hardware.md").read_text()
+    for item in CHECKLIST:
+        assert f"**{item.id}**" in text, item.id
