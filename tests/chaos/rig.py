@@ -12,8 +12,9 @@ from pathlib import Path
 
 from tests.chaos.manager import Manager
 from tests.chaos.wall_clock import WallClock
+from tests.endpoints import free_endpoint
 from tests.hil.injection import FILE, Window
-from tests.hil.rig import ROOT, Rig, Subscriber, far_ends, free_endpoint, service_command
+from tests.hil.rig import ROOT, Rig, Subscriber, far_ends, service_command
 from tests.hil.scene import read_scene, write_scene
 from tests.hil.service import HANGS
 

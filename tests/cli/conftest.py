@@ -1,13 +1,13 @@
 """Recordings and a way to run the command line as a user does."""
 
 import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from tests.cli.recordings import write_blank_recording
+from tests.program import COMMAND
 
 Run = Callable[..., "subprocess.CompletedProcess[str]"]
 
@@ -23,7 +23,7 @@ def ghest_rt() -> Run:
     """Run `ghest-rt` with arguments, to its end."""
 
     def run(*arguments: object) -> "subprocess.CompletedProcess[str]":
-        command = [sys.executable, "-m", "ghest_rt.cli.main", *map(str, arguments)]
+        command = [*COMMAND, *map(str, arguments)]
         return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
 
     return run

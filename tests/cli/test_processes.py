@@ -2,21 +2,14 @@
 
 import json
 import signal
-import socket
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 from tests.cli.conftest import Run
-
-COMMAND = (sys.executable, "-m", "ghest_rt.cli.main")
-
-
-def free_endpoint() -> str:
-    with socket.create_server(("127.0.0.1", 0)) as probe:
-        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+from tests.endpoints import free_endpoint
+from tests.program import COMMAND
 
 
 def test_listen_in_another_process_gets_every_sample(ghest_rt: Run, blank: Path) -> None:

@@ -17,7 +17,8 @@ from ghest_rt.security.session import open_session
 from ghest_rt.service.health import HealthMeter, SampleCounts
 from ghest_rt.service.pacing import Pacer
 from tests.cli.conftest import Run
-from tests.cli.test_processes import COMMAND, free_endpoint
+from tests.endpoints import free_endpoint
+from tests.program import COMMAND
 
 
 @contextmanager

@@ -2,7 +2,6 @@
 
 import contextlib
 import json
-import socket
 import subprocess
 import sys
 import threading
@@ -32,11 +31,6 @@ def answer(child: "subprocess.Popen[str]") -> str:
     """Return the next line of a process."""
     assert child.stdout is not None
     return child.stdout.readline()
-
-
-def free_endpoint() -> str:
-    with socket.create_server(("127.0.0.1", 0)) as probe:
-        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
 
 
 @contextlib.contextmanager

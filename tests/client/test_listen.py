@@ -2,19 +2,19 @@
 
 import json
 import subprocess
-import sys
 from pathlib import Path
 
 from tests.client.fakes import FakeStation, Network
+from tests.program import COMMAND
 
-COMMAND = (sys.executable, "-m", "ghest_rt.cli.main", "listen")
+LISTEN = (*COMMAND, "listen")
 
 
 def test_it_prints_samples_as_json_lines_and_says_what_happened_beside_them(tmp_path: Path) -> None:
     out = tmp_path / "samples.jsonl"
     with FakeStation("one") as one, Network(one.endpoint) as network, out.open("w") as file:
         listening = subprocess.Popen(
-            [*COMMAND, "--connect", network.endpoint, "--station", "one", "--count", "150", "--json"],
+            [*LISTEN, "--connect", network.endpoint, "--station", "one", "--count", "150", "--json"],
             stdout=file,
             stderr=subprocess.PIPE,
             text=True,
@@ -37,7 +37,7 @@ def test_it_prints_samples_as_json_lines_and_says_what_happened_beside_them(tmp_
 
 def test_an_identity_that_is_none_is_bad_input(tmp_path: Path) -> None:
     done = subprocess.run(
-        [*COMMAND, "--connect", "tls/127.0.0.1:7447", "--identity", str(tmp_path)], capture_output=True, text=True, check=False
+        [*LISTEN, "--connect", "tls/127.0.0.1:7447", "--identity", str(tmp_path)], capture_output=True, text=True, check=False
     )
     assert done.returncode == 2
     assert "no identity here" in done.stderr

@@ -4,7 +4,8 @@ import json
 
 from ghest_rt.client import ConnectionChanged, GhestClient
 from tests.client.fakes import FakeStation, Told
-from tests.client.processes import answer, free_endpoint, process, tell
+from tests.client.processes import answer, process, tell
+from tests.endpoints import free_endpoint
 
 
 def test_a_router_in_between_changes_nothing() -> None:

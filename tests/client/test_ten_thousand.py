@@ -2,7 +2,8 @@
 
 import json
 
-from tests.client.processes import answer, free_endpoint, process, tell
+from tests.client.processes import answer, process, tell
+from tests.endpoints import free_endpoint
 
 SAMPLES = 10_000
 PERIOD_S = 0.0003

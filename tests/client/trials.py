@@ -12,7 +12,8 @@ from collections.abc import Callable
 
 from ghest_rt.client import ConnectionChanged, GhestClient
 from tests.client.fakes import FakeStation, Network, Told
-from tests.client.processes import answer, free_endpoint, process, tell
+from tests.client.processes import answer, process, tell
+from tests.endpoints import free_endpoint
 
 PERIOD_S = 1 / 66.6
 REPEATS = 5

@@ -2,7 +2,6 @@
 
 import json
 import subprocess
-import sys
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -14,14 +13,13 @@ from ghest_rt.cli.doctor.checklist import CHECKLIST
 from ghest_rt.cli.doctor.findings import exit_code, missing, note, ok
 from ghest_rt.cli.doctor.links import SerialPort
 from tests.doctor.stations import SR300, station_of
+from tests.program import COMMAND
 
 _ROOT = Path(__file__).parents[2]
 
 
 def doctor(*arguments: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "ghest_rt.cli.main", "doctor", *arguments], capture_output=True, text=True, check=False
-    )
+    return subprocess.run([*COMMAND, "doctor", *arguments], capture_output=True, text=True, check=False)
 
 
 def test_a_station_without_its_devices_ends_with_3_and_says_what_to_do(tmp_path: Path, station_text: str) -> None:

@@ -4,7 +4,6 @@ import json
 import os
 import shutil
 import signal
-import socket
 import subprocess
 import sys
 import threading
@@ -20,9 +19,11 @@ import zenoh
 
 from ghest_rt.config.shipped import shipped_config_dir
 from ghest_rt.security.session import Mode, open_session
+from tests.endpoints import free_endpoint
 from tests.hardware_encoders.can_senders import ARMEO_SOURCES
 from tests.hil.injection import FOLDER_VARIABLE, Window, inject
 from tests.hil.scene import FRAME_RATE_HZ, STATION_FILE, Scene, read_scene, write_scene
+from tests.program import COMMAND
 
 ROOT = Path(__file__).parents[2]
 FIXTURES = ("realsense-serial", "oak-can")
@@ -174,7 +175,7 @@ def fixture_rig(name: str, folder: Path, record_to: Path | None = None) -> Itera
 @contextmanager
 def station_rig(station: Path) -> Iterator[Rig]:
     """Run the service on a real station."""
-    command = [sys.executable, "-m", "ghest_rt.cli.main", "run", "--station", str(station)]
+    command = [*COMMAND, "run", "--station", str(station)]
     with _running(f"station {station}", command, dict(os.environ), None, None) as rig:
         yield rig
 
@@ -253,8 +254,3 @@ def wait_until(condition: Callable[[], bool], timeout_s: float) -> bool:
             return False
         time.sleep(0.01)
     return True
-
-
-def free_endpoint() -> str:
-    with socket.create_server(("127.0.0.1", 0)) as probe:
-        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"

@@ -2,7 +2,6 @@
 
 import json
 import subprocess
-import sys
 import time
 from pathlib import Path
 
@@ -11,6 +10,7 @@ import pytest
 pytest.importorskip("mujoco", reason="needs the extra sim")
 
 from tests.cli.conftest import Run, ghest_rt
+from tests.program import COMMAND
 
 __all__ = ["ghest_rt"]
 
@@ -42,7 +42,7 @@ def test_a_folder_that_cannot_be_made_is_bad_input(ghest_rt: Run, tmp_path: Path
 
 
 def test_what_a_killed_command_has_recorded_can_be_estimated(ghest_rt: Run, tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "ghest_rt.cli.main", "record", "--station", STATION, "--out", tmp_path, "--no-publish"]
+    command = [*COMMAND, "record", "--station", STATION, "--out", tmp_path, "--no-publish"]
     recorder = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     try:
         deadline_s = time.monotonic() + 30.0

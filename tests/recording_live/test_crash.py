@@ -3,32 +3,14 @@
 import os
 import signal
 import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from ghest_drivers.samples import EncoderSample, RgbdFrame
 from ghest_rt.recording.problems import Skip
 from ghest_rt.recording.reader import Recording
-
-RATE_HZ = 100
-FEEDER = (sys.executable, "-m", "tests.recording_live.feeder")
-ROOT = Path(__file__).parents[2]
-
-
-def newest(recording: Recording) -> dict[str, int]:
-    """Number of the newest sample of each input, all before it being there too."""
-    seqs: dict[str, list[int]] = {}
-    for event in recording.events():
-        if isinstance(event, RgbdFrame):
-            seqs.setdefault(event.info.name, []).append(event.seq)
-        elif isinstance(event, EncoderSample):
-            seqs.setdefault("encoders", []).append(event.seq)
-    assert set(seqs) == {"r0", "r1", "encoders"}
-    assert all(found == list(range(len(found))) for found in seqs.values())
-    return {name: found[-1] for name, found in seqs.items()}
+from tests.recording_live.feeding import FEEDER, RATE_HZ, ROOT, feed_until_killed, newest
 
 
 def only_recording(folder: Path) -> Recording:
@@ -37,17 +19,7 @@ def only_recording(folder: Path) -> Recording:
 
 
 def test_kill_9_loses_at_most_the_last_second(tmp_path: Path) -> None:
-    feeder = subprocess.Popen([*FEEDER, tmp_path], stdout=subprocess.PIPE, text=True, cwd=ROOT)
-    assert feeder.stdout is not None
-    last = 0
-    for line in feeder.stdout:
-        last = int(line)
-        if last >= 250:
-            break
-    feeder.kill()
-    last = max([last, *(int(line) for line in feeder.stdout if line.endswith("\n"))])
-    feeder.wait(10)
-    feeder.stdout.close()
+    last = feed_until_killed(tmp_path, at=250)
     recording = only_recording(tmp_path)
     assert min(newest(recording).values()) >= last - RATE_HZ
     assert Skip.TRUNCATED in [problem.skip for problem in recording.problems]

@@ -10,9 +10,10 @@ from ghest_rt.errors import GhestError
 from ghest_rt.security.handshake import try_handshake
 from ghest_rt.security.identity_check import load_identity
 from ghest_rt.security.session import open_session
+from tests.endpoints import free_port
 from tests.security.raw import open_raw
 from tests.security.station import CALIBRATE_KEY
-from tests.security.target import FORGED, SETTLE_S, Outcome, Target, free_port
+from tests.security.target import FORGED, SETTLE_S, Outcome, Target
 
 
 def forged_publisher(target: Target) -> Outcome:

@@ -1,7 +1,6 @@
 """The station that is attacked, in a process of its own, and what came of it."""
 
 import json
-import socket
 import subprocess
 import sys
 import tempfile
@@ -102,9 +101,3 @@ def reads(session: zenoh.Session, target: Target) -> str:
         time.sleep(0.1)
     parts = {"samples": got["samples"], "answers": replies, "tokens": tokens}
     return ", ".join(f"{count} {what}" for what, count in parts.items() if count)
-
-
-def free_port() -> int:
-    """Return a port that nobody listens on."""
-    with socket.create_server(("127.0.0.1", 0)) as probe:
-        return int(probe.getsockname()[1])

@@ -4,7 +4,6 @@ import contextlib
 import re
 import socket
 import subprocess
-import sys
 import threading
 import time
 
@@ -20,6 +19,7 @@ from ghest_rt.security.endpoints import split_endpoint
 from ghest_rt.security.gateway import Gateway
 from ghest_rt.security.identity_check import load_identity
 from ghest_rt.security.session import open_session
+from tests.program import COMMAND
 from tests.security.clinic import Clinic
 from tests.security.raw import open_raw
 
@@ -41,7 +41,7 @@ class Bench:
             ),
         ]
         self.publisher = self.session.declare_publisher(KEY)
-        command = [sys.executable, "-m", "ghest_rt.cli.main", "gateway", "--identity", str(clinic.router)]
+        command = [*COMMAND, "gateway", "--identity", str(clinic.router)]
         self.process = subprocess.Popen(
             [*command, "--listen", "tls/127.0.0.1:0", "--station", self.inside], stdout=subprocess.PIPE, text=True
         )

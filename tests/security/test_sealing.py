@@ -1,7 +1,6 @@
 """Sealed recordings: never in plain on the disk, the same when opened, whole up to the last moment whatever ends them."""
 
 import subprocess
-import sys
 import threading
 from pathlib import Path
 
@@ -19,8 +18,9 @@ from ghest_rt.security.unsealing import load_keys, unseal
 from ghest_rt.service.recorder import Recorder
 from ghest_rt.service.recorder_parts import Parts
 from ghest_rt.service.recorder_settings import RecorderSettings
+from tests.program import COMMAND
 from tests.recording_live.conftest import STARTED_UNIX_NS, STATION, T0_NS, Feed
-from tests.recording_live.test_crash import FEEDER, RATE_HZ, ROOT, newest
+from tests.recording_live.feeding import FEEDER, RATE_HZ, ROOT, feed_until_killed, newest
 
 
 class Key:
@@ -85,17 +85,7 @@ def test_each_of_several_keys_opens_it_and_no_other(tmp_path: Path, key: Key) ->
 
 def test_kill_9_loses_at_most_the_last_second(tmp_path: Path, key: Key) -> None:
     folder = tmp_path / "sealed"
-    feeder = subprocess.Popen([*FEEDER, folder, "--recipient", key.public], stdout=subprocess.PIPE, text=True, cwd=ROOT)
-    assert feeder.stdout is not None
-    last = 0
-    for line in feeder.stdout:
-        last = int(line)
-        if last >= 150:
-            break
-    feeder.kill()
-    last = max([last, *(int(line) for line in feeder.stdout if line.endswith("\n"))])
-    feeder.wait(10)
-    feeder.stdout.close()
+    last = feed_until_killed(folder, "--recipient", key.public, at=150)
     (sealed,) = folder.iterdir()
     before, size = -1, sealed.stat().st_size
     pause = threading.Event()
@@ -200,7 +190,7 @@ def test_what_looks_like_a_name_or_a_date_is_refused_and_not_repeated(text: str)
 
 def test_neither_pseudonym_nor_key_is_in_what_a_run_prints_or_logs(tmp_path: Path, key: Key) -> None:
     station = ROOT / "config" / "station-sim.toml"
-    command = [sys.executable, "-m", "ghest_rt.cli.main", "--verbose", "record", "--station", str(station), "--no-publish"]
+    command = [*COMMAND, "--verbose", "record", "--station", str(station), "--no-publish"]
     command += ["--out", str(tmp_path / "sealed"), "--duration", "1.5", "--subject", "ZQX-90417", "--encrypt-to", key.public]
     ended = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True)
     assert "ZQX-90417" not in ended.stdout + ended.stderr

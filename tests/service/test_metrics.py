@@ -2,7 +2,6 @@
 
 import socket
 import subprocess
-import sys
 import time
 import urllib.error
 import urllib.request
@@ -23,6 +22,8 @@ from ghest_rt.service.health import HealthMeter, SampleCounts
 from ghest_rt.service.inputs import InputCounters
 from ghest_rt.service.metrics import MetricsEndpoint
 from ghest_rt.service.pacing import Pacer
+from tests.endpoints import free_port
+from tests.program import COMMAND
 
 
 def health() -> Health:
@@ -123,12 +124,11 @@ def test_a_running_service_can_be_scraped(tmp_path: Path) -> None:
     pytest.importorskip("mujoco", reason="needs the extra sim")
     config = shipped_config_dir()
     (tmp_path / "armeo_spring.urdf").write_text((config / "armeo_spring.urdf").read_text())
-    with socket.create_server(("127.0.0.1", 0)) as probe:
-        port = probe.getsockname()[1]
+    port = free_port()
     station = tmp_path / "station.toml"
     station.write_text((config / "station-sim.toml").read_text() + f'\n[metrics]\nlisten = "127.0.0.1:{port}"\n')
     service = subprocess.Popen(
-        [sys.executable, "-m", "ghest_rt.cli.main", "run", "--station", station, "--no-publish"],
+        [*COMMAND, "run", "--station", station, "--no-publish"],
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
         text=True,

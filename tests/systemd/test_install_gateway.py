@@ -9,8 +9,7 @@ import pytest
 from ghest_rt.security.authority import Authority
 from ghest_rt.security.roles import Role
 from tests.systemd.conftest import PROGRAM, STATION, Install, needs_systemd
-from tests.systemd.test_install_service import files_in
-from tests.systemd.test_units import TARGETS, analyze, other_station
+from tests.systemd.system import TARGETS, analyze, files_in, other_station
 
 pytestmark = needs_systemd
 

@@ -11,15 +11,9 @@ from ghest_rt.cli.install_service.steps import shown
 from ghest_rt.config.shipped import shipped_systemd_dir
 from ghest_rt.errors import BadInputError
 from tests.systemd.conftest import PROGRAM, STATION, UNITS, Install, needs_systemd
-from tests.systemd.test_units import other_station
+from tests.systemd.system import files_in, other_station
 
 pytestmark = needs_systemd
-
-
-def files_in(root: Path) -> set[str]:
-    """Return the files of the installation; what sysusers leaves (users) is not one."""
-    names = {str(path.relative_to(root)) for path in root.rglob("*") if path.is_symlink() or path.is_file()}
-    return {name for name in names if "ghest-rt" in name and not name.startswith("opt/")}
 
 
 def test_the_dry_run_shows_every_step_and_does_none(install: Install, root: Path) -> None:

@@ -12,7 +12,8 @@ import pytest
 
 from ghest_rt.security.session import open_session
 from tests.cli.recordings import write_blank_recording
-from tests.cli.test_processes import COMMAND, free_endpoint
+from tests.endpoints import free_endpoint
+from tests.program import COMMAND
 from tests.systemd.manager_socket import ManagerSocket
 
 WATCHDOG_S = 0.8

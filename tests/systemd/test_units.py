@@ -10,22 +10,9 @@ import pytest
 
 from ghest_rt.cli.doctor.usb import usb_cameras
 from tests.systemd.conftest import STATION, UNITS, Install, needs_systemd
+from tests.systemd.system import TARGETS, analyze, other_station
 
-TARGETS = Path("/usr/lib/systemd/system")
 LARGEST_EXPOSURE = 20  # tenths
-
-
-def analyze(*arguments: object) -> "subprocess.CompletedProcess[str]":
-    return subprocess.run(["systemd-analyze", *map(str, arguments)], capture_output=True, text=True, timeout=60, check=False)
-
-
-def other_station(folder: Path) -> Path:
-    """Return a second station that gets along with the first."""
-    folder.mkdir()
-    text = STATION.read_text().replace('id = "sim"', 'id = "bed-2"')
-    (folder / "station.toml").write_text(f'{text}\n[publisher]\nlisten = ["tcp/127.0.0.1:7448"]\n')
-    shutil.copy(STATION.parent / "armeo_spring.urdf", folder)
-    return folder / "station.toml"
 
 
 @needs_systemd
