@@ -58,16 +58,16 @@ class HostSource:
         self._beginning: threading.Thread | None = None
 
     def connect(self, settings: OakSettings) -> tuple[Images, Any]:
-        pipeline = dai.Pipeline(createImplicitDevice=False)
-        sync = pipeline.create(dai.node.Sync)
+        self.pipeline = dai.Pipeline(createImplicitDevice=False)
+        sync = self.pipeline.create(dai.node.Sync)
         self.color = sync.inputs["color"].createInputQueue()
         if settings.depth:
             self.depth = sync.inputs["depth"].createInputQueue()
         self.started = dai.Clock.now()
         self._released.clear()
-        self._beginning = threading.Thread(target=self._begin, args=(pipeline, "cd" if settings.depth else "c"))
+        self._beginning = threading.Thread(target=self._begin, args=(self.pipeline, "cd" if settings.depth else "c"))
         self._beginning.start()
-        return Images(pipeline, "OAK-D-SR", "1844"), sync
+        return Images(self.pipeline, "OAK-D-SR", "1844"), sync
 
     def _begin(self, pipeline: Any, streams: str) -> None:
         while not self._released.wait(_START_S):

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from pydantic import TypeAdapter, ValidationError
 
-from ghest_drivers.clock import MonotonicClock
+from ghest_drivers.clock import Clock, MonotonicClock
 from ghest_drivers.errors import DeviceNotFound, EndOfStream
 from ghest_drivers.factory import make_camera
 from ghest_drivers.hardware import camera_backends
@@ -30,6 +30,13 @@ def settings_of(**device: object) -> dict[str, object]:
     return settings
 
 
+class MadeCamera:
+    """In place of a driver: keeps the settings it is made with."""
+
+    def __init__(self, name: str, source: object, settings: Any, clock: Clock) -> None:
+        self.settings = settings
+
+
 @pytest.mark.parametrize(
     "device", [{"backend": "realsense", "serial": "1"}, {"backend": "oak", "mxid": "1"}], ids=lambda device: device["backend"]
 )
@@ -41,22 +48,24 @@ def test_live_cameras_run_in_a_process_of_their_own_unless_told_otherwise(device
 
 
 @needs_realsense
-def test_every_realsense_setting_reaches_the_driver() -> None:
+def test_every_realsense_setting_reaches_the_driver(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("ghest_drivers.hardware.realsense.camera.RealsenseCamera", MadeCamera)
     settings = settings_of(
         backend="realsense", serial="1", preset="Short Range", laser_power=3, latency_ms=4.5, align=True, record_bag="x.bag",
         color_options={"gain": 3.0}, depth_width_px=320, depth_height_px=240, supervised=False,
     )  # fmt: skip
     watched: Any = make_camera("realsense", "r0", MonotonicClock(), settings)
-    made = watched.camera._settings
+    made = watched.camera.settings
     assert (made.preset, made.laser_power, made.latency_ns, made.align) == ("Short Range", 3, 4_500_000, True)
     assert (made.color_options, made.depth_width_px, made.record_bag) == ({"gain": 3.0}, 320, Path("x.bag"))
 
 
 @needs_oak
-def test_every_oak_setting_reaches_the_driver() -> None:
+def test_every_oak_setting_reaches_the_driver(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("ghest_drivers.hardware.oak.camera.OakCamera", MadeCamera)
     settings = settings_of(backend="oak", mxid="18", rate_hz=30, sensitivity_iso=200, exposure_us=4000, supervised=False)
     watched: Any = make_camera("oak", "r0", MonotonicClock(), settings)
-    made = watched.camera._settings
+    made = watched.camera.settings
     assert (made.rate_hz, made.sensitivity_iso, made.exposure_us, made.width_px) == (30, 200, 4000, 640)
 
 

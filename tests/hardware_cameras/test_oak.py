@@ -117,8 +117,7 @@ def test_silence_is_a_timeout(camera: OakCamera) -> None:
 def test_a_pipeline_that_stops_is_a_lost_device(camera: OakCamera, source: HostSource) -> None:
     camera.open()
     camera.read(_LONG_S)
-    session: Any = camera._session
-    session._pipeline.stop()
+    source.pipeline.stop()
     with pytest.raises(DeviceLost):
         camera.read(_LONG_S)
 

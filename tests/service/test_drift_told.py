@@ -10,7 +10,7 @@ from ghest_rt.messages.results import DriftReport, ElbowAngles, GhEstimate, Mark
 from ghest_rt.service.compose import AnglesComposer, Numbering
 from ghest_rt.service.drift_watch import DriftWatch
 from tests.service.fakes import FakePipeline
-from tests.service.test_loop import Rig
+from tests.service.rig import Rig
 
 MS = 1_000_000
 
@@ -69,8 +69,7 @@ async def test_the_service_sends_an_event_when_a_marker_has_moved() -> None:
             found = super().estimate(t_ns)
             return found if found.gh_from_arm is None else estimate(DriftReport(drift(True, 0.02), drift(False)))
 
-    rig = Rig()
-    rig.service._make_pipeline = lambda infos, joints: Drifting()
+    rig = Rig(pipeline=Drifting)
 
     async def scene() -> None:
         rig.feed()

@@ -3,76 +3,16 @@
 import asyncio
 import itertools
 import threading
-from collections.abc import Callable
 
 import pytest
 
 from ghest_drivers.errors import BadDeviceData, DeviceLost
-from ghest_drivers.samples import CameraInfo
 from ghest_rt.errors import DeviceError
 from ghest_rt.messages.published import EventKind, InputState
-from ghest_rt.messages.results import Reason, Status
-from ghest_rt.service.clocks import ScaledClock
-from ghest_rt.service.compose import AnglesComposer, Numbering
-from ghest_rt.service.contract import PipelineLike, ServiceSettings, ServiceSummary
+from ghest_rt.messages.results import GhEstimate, Reason, Status
 from ghest_rt.service.inputs import Backoff, InputSettings
-from ghest_rt.service.loop import Service
-from tests.service.fakes import END, Collector, FakeCamera, FakeEncoders, FakePipeline, encoder_sample, frame
-
-LAG_NS = 20_000_000
-QUICK = InputSettings(read_timeout_s=0.01, silent_after=2, lost_after=1000, backoff=Backoff(first_s=0.002, limit_s=0.01))
-
-
-class Rig:
-    """A service on fakes, on the host's clock at 200 Hz."""
-
-    def __init__(
-        self,
-        inputs: InputSettings = QUICK,
-        cameras: dict[str, FakeCamera] | None = None,
-        observe_hook: Callable[[object], None] = lambda frame: None,
-    ) -> None:
-        self.clock = ScaledClock()
-        self.cameras = cameras or {"r0": FakeCamera("r0"), "r1": FakeCamera("r1")}
-        self.encoders = FakeEncoders()
-        self.pipelines: list[FakePipeline] = []
-        self.out = Collector()
-        self.service = Service(
-            settings=ServiceSettings(rate_hz=200.0, lag_ns=LAG_NS, inputs=inputs),
-            cameras=self.cameras,
-            encoders=self.encoders,
-            make_pipeline=self._make,
-            composer=AnglesComposer("right", "fake", "cal", unix_offset_ns=0, numbering=Numbering()),
-            outputs=(self.out,),
-            clock=self.clock,
-        )
-        self._hook = observe_hook
-
-    def _make(self, infos: dict[str, CameraInfo], joints: tuple[str, ...]) -> PipelineLike:
-        self.pipelines.append(FakePipeline(self._hook))
-        return self.pipelines[-1]
-
-    def feed(self, seq: int = 0, cameras: tuple[str, ...] = ("r0", "r1")) -> int:
-        t_ns = self.clock.now_ns()
-        for name in cameras:
-            self.cameras[name].script.put(frame(name, seq, t_ns))
-        self.encoders.script.put_nowait(encoder_sample(seq, t_ns))
-        return t_ns
-
-    def end(self) -> None:
-        for camera in self.cameras.values():
-            camera.script.put(END)
-        self.encoders.script.put_nowait(END)
-
-    async def during(self, scene: Callable[[], object]) -> ServiceSummary:
-        """Run the service while `scene` plays, then stop it."""
-        task = asyncio.create_task(self.service.run())
-        try:
-            await scene()  # type: ignore[misc]
-        finally:
-            self.service.stop()
-            summary = await task
-        return summary
+from tests.service.fakes import FakeCamera, FakePipeline, frame
+from tests.service.rig import LAG_NS, Rig
 
 
 async def test_samples_are_numbered_on_the_grid_and_carry_their_age() -> None:
@@ -254,13 +194,11 @@ async def test_a_recording_that_breaks_is_a_device_error() -> None:
 
 
 async def test_a_failing_estimator_ends_the_service_with_its_error() -> None:
-    rig = Rig()
-
     class Broken(FakePipeline):
-        def estimate(self, t_ns: int) -> object:  # type: ignore[override]
+        def estimate(self, t_ns: int) -> GhEstimate:
             raise ZeroDivisionError("estimator")
 
-    rig.service._make_pipeline = lambda infos, joints: Broken()  # type: ignore[assignment,return-value]
+    rig = Rig(pipeline=Broken)
     rig.feed()
     with pytest.raises(ZeroDivisionError, match="estimator"):
         await asyncio.wait_for(rig.service.run(), 10.0)

@@ -1,7 +1,9 @@
 """The study engine: nothing run twice, nothing finished lost."""
 
+import importlib.util
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -106,6 +108,15 @@ def test_the_key_depends_on_parameters_needs_and_code_but_not_on_the_cost() -> N
     assert task.key(salted) != task.key(lambda kind: f"newer code of {kind}")
 
 
+def fresh_salt() -> Any:
+    """The module as a new process has it: nothing is kept from before."""
+    spec = importlib.util.find_spec("ghest_rt.studies.engine.salt")
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
 def test_a_change_of_the_code_beside_a_task_counts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "kinds").mkdir()
     (tmp_path / "kinds" / "tasks.py").write_text("from kinds import helper\n")
@@ -114,26 +125,21 @@ def test_a_change_of_the_code_beside_a_task_counts(tmp_path: Path, monkeypatch: 
     salts = []
     for text in ("one", "two", "one"):
         helper.write_text(f"# {text}\n")
-        salt.code_salt.cache_clear()
-        salts.append(salt.code_salt("kinds.tasks:run"))
+        salts.append(fresh_salt().code_salt("kinds.tasks:run"))
     assert salts[0] == salts[2] != salts[1]
 
 
-def test_other_libraries_count_for_what_uses_them(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_other_libraries_count_for_what_uses_them() -> None:
     kinds = ("ghest_rt.studies.observing.tasks:observe_session", "ghest_rt.studies.sensitivity.sobol:evaluate")
 
     def salts(**versions: str) -> list[str]:
-        monkeypatch.setattr(salt, "version", lambda package: versions.get(package, "1"))
-        salt.code_salt.cache_clear()
-        salt._hash_of.cache_clear()
-        return [salt.code_salt(kind) for kind in kinds]
+        fresh = fresh_salt()
+        fresh.version = lambda package: versions.get(package, "1")
+        return [fresh.code_salt(kind) for kind in kinds]
 
     one, newer, mujoco = salts(), salts(SALib="2"), salts(mujoco="2")
     assert (one[0] == newer[0], one[1] == newer[1]) == (True, False)
     assert (one[0] == mujoco[0], one[1] == mujoco[1]) == (False, False)
-    monkeypatch.undo()
-    salt.code_salt.cache_clear()
-    salt._hash_of.cache_clear()
 
 
 def test_results_appear_whole_or_not_at_all(tmp_path: Path) -> None:
