@@ -154,6 +154,14 @@ def camera(camera_case: CameraCase) -> Iterator[RgbdCamera]:
         camera.close()
 
 
+@pytest.fixture(params=[name for name, case in CAMERA_CASES.items() if case.ends])
+def ending_camera(request: pytest.FixtureRequest) -> Iterator[RgbdCamera]:
+    """A camera whose frames end, not open."""
+    with CAMERA_CASES[request.param].make(False) as camera:
+        yield camera
+        camera.close()
+
+
 @pytest.fixture
 def silent_camera(camera_case: CameraCase) -> Iterator[RgbdCamera]:
     """A camera that sends one frame at most, not open."""
@@ -166,6 +174,14 @@ def silent_camera(camera_case: CameraCase) -> Iterator[RgbdCamera]:
 async def encoders(encoder_case: EncoderCase) -> AsyncIterator[EncoderLink]:
     """A link with samples, not open."""
     async with encoder_case.make(False) as encoders:
+        yield encoders
+        await encoders.close()
+
+
+@pytest.fixture(params=[name for name, case in ENCODER_CASES.items() if case.ends])
+async def ending_encoders(request: pytest.FixtureRequest) -> AsyncIterator[EncoderLink]:
+    """A link whose samples end, not open."""
+    async with ENCODER_CASES[request.param].make(False) as encoders:
         yield encoders
         await encoders.close()
 

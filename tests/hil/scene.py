@@ -113,7 +113,7 @@ def write_scene(folder: Path, epoch_ns: int) -> None:
             sensor="hil",
             seed=11,
             duration_s=DURATION_S + 0.1,
-            station=folder / STATION_FILE,  # type: ignore[arg-type]
+            station=folder / STATION_FILE,
         )
     )
     start_ns = world.timeline.start_ns

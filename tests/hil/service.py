@@ -34,7 +34,7 @@ def _let_the_loop_hang_on_request() -> None:
         if injected.fault(time.monotonic_ns()) == "hang":
             time.sleep(60)
 
-    LiveView.angles = angles  # type: ignore[assignment, method-assign]
+    LiveView.angles = angles  # type: ignore[method-assign]
 
 
 if __name__ == "__main__":
