@@ -18,7 +18,7 @@ from ghest_rt.studies.observing.tasks import observe_task
 from ghest_rt.studies.session.tasks import judge_task
 from tests.studies.study_tasks import square_task
 
-distributed = pytest.importorskip("distributed")
+distributed = pytest.importorskip("distributed", reason="needs the extra cluster")
 
 
 @pytest.fixture(scope="module")
