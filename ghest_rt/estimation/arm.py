@@ -90,7 +90,7 @@ def eq10_m0_from_arm(e_from_m0: Array, e_from_arm: Array) -> Array:
     Returns:
         (4, 4) upper arm in the m0 frame, metres.
     """
-    return inverse(e_from_m0) @ e_from_arm
+    return np.asarray(inverse(e_from_m0).dot(e_from_arm))
 
 
 def gh_from_arm_rotation(m0_from_gh: Array, m0_from_arm: Array) -> Array:
@@ -100,4 +100,4 @@ def gh_from_arm_rotation(m0_from_gh: Array, m0_from_arm: Array) -> Array:
         m0_from_gh: (4, 4) GH joint frame in the m0 frame, by calibration.
         m0_from_arm: (4, 4) upper arm in the m0 frame, equation (10).
     """
-    return np.asarray(m0_from_gh[:3, :3].T @ m0_from_arm[:3, :3])
+    return np.asarray(m0_from_gh[:3, :3].T.dot(m0_from_arm[:3, :3]))

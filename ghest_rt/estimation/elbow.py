@@ -61,15 +61,15 @@ class ElbowGeometry:
             None if the forearm seems to lie along the elbow's flexion axis.
         """
         R = e_from_arm[:3, :3]
-        fx, fy, fz = (R.T @ self.forearm_in_e(joint_positions)).tolist()
+        fx, fy, fz = R.T.dot(self.forearm_in_e(joint_positions)).tolist()
         cosine = math.hypot(fy, fz)
         if cosine < _LEAST_COSINE:
             return None
         sigma = None
         if covariance is not None:
             # Of flexion and carrying angle by the arm's rotation, E axes.
-            J = np.array([[-1.0, fx * fy / cosine**2, fx * fz / cosine**2], [0.0, -fz / cosine, fy / cosine]]) @ R.T
-            flexion, carrying = ((J @ covariance) * J).sum(axis=1).tolist()
+            J = np.array([[-1.0, fx * fy / cosine**2, fx * fz / cosine**2], [0.0, -fz / cosine, fy / cosine]]).dot(R.T)
+            flexion, carrying = J.dot(covariance).dot(J.T).diagonal().tolist()
             sigma = (math.sqrt(flexion + self._variance / cosine**2), math.sqrt(carrying + self._variance))
         return ElbowAngles(
             flexion_rad=math.atan2(self._side * fy, -fz),

@@ -30,7 +30,7 @@ def covariance_in_e(covariance: Array, e_from_camera: Array) -> Array:
     """
     turn = np.zeros((6, 6))
     turn[:3, :3] = turn[3:, 3:] = e_from_camera[:3, :3]
-    return np.asarray(turn @ covariance @ turn.T)
+    return np.asarray(turn.dot(covariance).dot(turn.T))
 
 
 def rotation_jacobians(
@@ -89,13 +89,12 @@ def euler_sigma_rad(gh_from_arm: Array, covariance: Array) -> tuple[float, float
         sine_a, cosine_a = vx / cosine_b, vz / cosine_b
     # Rows of the inverse of [e_y, Ry e_x, V], with V = (sin a cos b, -sin b, cos a cos b).
     tangent = -vy / cosine_b
-    rows = np.array(
-        [
-            [tangent * sine_a, 1.0, tangent * cosine_a],
-            [cosine_a, 0.0, -sine_a],
-            [sine_a / cosine_b, 0.0, cosine_a / cosine_b],
-        ]
+    rows = (
+        (tangent * sine_a, 1.0, tangent * cosine_a),
+        (cosine_a, 0.0, -sine_a),
+        (sine_a / cosine_b, 0.0, cosine_a / cosine_b),
     )
-    variances = ((rows @ covariance) * rows).sum(axis=1).tolist()
+    (xx, xy, xz), (_, yy, yz), (_, _, zz) = covariance.tolist()
+    variances = (x * x * xx + y * y * yy + z * z * zz + 2.0 * (x * y * xy + x * z * xz + y * z * yz) for x, y, z in rows)
     a, b, g = (min(math.sqrt(max(v, 0.0)), _UNKNOWN_RAD) for v in variances)
     return a, b, g

@@ -21,7 +21,7 @@ def inverse(T: Array) -> Array:
     out = _EYE.copy()
     R_t = T[:3, :3].T
     out[:3, :3] = R_t
-    out[:3, 3] = -(R_t @ T[:3, 3])
+    out[:3, 3] = -R_t.dot(T[:3, 3])
     return out
 
 

@@ -22,6 +22,11 @@ def skew(v: Array) -> Array:
 def exp_so3(rotvec_rad: Array) -> Array:
     """Return the rotation matrix of a rotation vector (Rodrigues)."""
     x, y, z = rotvec_rad.tolist()
+    return rotation(x, y, z)
+
+
+def rotation(x: float, y: float, z: float) -> Array:
+    """Return `exp_so3` of a rotation vector given by its components, rad."""
     angle2 = x * x + y * y + z * z
     angle = math.sqrt(angle2)
     if angle < _SMALL_RAD:

@@ -15,8 +15,8 @@ class ForwardKinematics:
     """Poses of links in the base link, from the positions of the measured joints.
 
     A revolute joint's motion is I + sin(q) K + (1 - cos(q)) K^2 (Rodrigues), a prismatic one's I + q P, so that each moving
-    joint with the fixed part before it is a sum of three constant matrices: evaluating a chain is one
-    vectorised sum and one small matrix product per moving joint.
+    joint with the fixed part before it is a sum of three constant matrices: evaluating a chain is one product with all of them
+    and one small matrix product per moving joint.
     """
 
     def __init__(
@@ -105,9 +105,7 @@ class _CompiledChain:
             # What stands still behind the last moving joint is folded into that joint's matrices.
             for parts in (constant_parts, first_parts, second_parts):
                 parts[-1] = parts[-1] @ still
-            self._constant = np.array(constant_parts).reshape(-1, 16)
-            self._first = np.array(first_parts).reshape(-1, 16)
-            self._second = np.array(second_parts).reshape(-1, 16)
+            self._basis = _basis(constant_parts, first_parts, second_parts)
             self._gain = np.array(gains)
             self._offset = np.array(offsets)
             self._prismatic: NDArray[np.intp] | None = np.array(prismatic, dtype=np.intp) if prismatic else None
@@ -117,18 +115,29 @@ class _CompiledChain:
             return self._still.copy()
         q = self._gain.dot(joint_positions)
         q += self._offset
-        sine = np.sin(q)
-        versine = 1.0 - np.cos(q)
+        count = len(q)
+        factors = np.empty(2 * count + 1)
+        np.sin(q, out=factors[:count])
+        np.cos(q, out=factors[count:-1])
+        factors[-1] = 1.0
         if self._prismatic is not None:
-            sine[self._prismatic] = q[self._prismatic]
-        matrices = sine[:, None] * self._first
-        matrices += self._constant
-        matrices += versine[:, None] * self._second
-        steps = matrices.reshape(-1, 4, 4)
+            factors[self._prismatic] = q[self._prismatic]
+        steps = factors.dot(self._basis).reshape(count, 4, 4)
         pose = steps[0]
         for step in steps[1:]:
             pose = pose.dot(step)
         return np.array(pose)
+
+
+def _basis(constant: Sequence[Array], first: Sequence[Array], second: Sequence[Array]) -> Array:
+    """Return the (2 n + 1, 16 n) matrix that makes all n joints' matrices of (sines, cosines, 1)."""
+    count = len(constant)
+    basis = np.zeros((2 * count + 1, 16 * count))
+    for j, parts in enumerate(zip(constant, first, second, strict=True)):
+        here = slice(16 * j, 16 * j + 16)
+        still, sine, versine = (part.ravel() for part in parts)
+        basis[j, here], basis[count + j, here], basis[-1, here] = sine, -versine, still + versine
+    return basis
 
 
 def _motion(joint: Joint, position: float) -> Array:

@@ -1,5 +1,7 @@
 """Equations (6) and (7) of the paper: cameras and markers in the exoskeleton base frame E."""
 
+import numpy as np
+
 from ghest_rt.geometry.so3 import Array
 
 
@@ -13,7 +15,7 @@ def eq6_e_from_camera(e_from_link: Array, link_from_camera: Array) -> Array:
     Returns:
         (4, 4) pose of the camera in E, metres.
     """
-    return e_from_link @ link_from_camera
+    return np.asarray(e_from_link.dot(link_from_camera))
 
 
 def eq7_e_from_marker(e_from_camera: Array, camera_from_marker: Array) -> Array:
@@ -26,4 +28,4 @@ def eq7_e_from_marker(e_from_camera: Array, camera_from_marker: Array) -> Array:
     Returns:
         (4, 4) pose of the marker in E, metres.
     """
-    return e_from_camera @ camera_from_marker
+    return np.asarray(e_from_camera.dot(camera_from_marker))

@@ -1,8 +1,8 @@
 """The encoder samples of the last seconds, and the joint angles at any instant between them."""
 
 from collections import Counter
-from dataclasses import dataclass
 from enum import StrEnum
+from typing import NamedTuple
 
 import numpy as np
 
@@ -34,8 +34,7 @@ class EncoderRejection(StrEnum):
     BEYOND_LIMITS = "beyond_limits"  # outside the URDF's joint limits by more than 0.2 rad
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class JointState:
+class JointState(NamedTuple):
     """Joint positions at an instant.
 
     Attributes:
@@ -63,8 +62,10 @@ class EncoderTrack:
         Args:
             limits: (n, 2) least and greatest position of each joint; infinite where unknown.
         """
-        self._lower = limits[:, 0] - _LIMIT_MARGIN
-        self._upper = limits[:, 1] + _LIMIT_MARGIN
+        # Finite, so that what is within them is.
+        lower, upper = np.nan_to_num((limits + np.array([-_LIMIT_MARGIN, _LIMIT_MARGIN])).T)
+        self._lower: list[float] = lower.tolist()
+        self._upper: list[float] = upper.tolist()
         self._history: History[EncoderSample] = History(_CAPACITY)
         self._newest: EncoderSample | None = None
         self.rejected: Counter[EncoderRejection] = Counter()
@@ -89,12 +90,10 @@ class EncoderTrack:
 
     def _reason_against(self, sample: EncoderSample) -> EncoderRejection | None:
         angles = sample.angles_rad
-        if angles.shape != self._lower.shape:
+        if angles.shape != (len(self._lower),):
             return EncoderRejection.WRONG_SIZE
-        if not np.isfinite(angles).all():
-            return EncoderRejection.NOT_FINITE
-        if (angles < self._lower).any() or (angles > self._upper).any():
-            return EncoderRejection.BEYOND_LIMITS
+        if not all(low <= angle <= high for low, angle, high in zip(self._lower, angles.tolist(), self._upper, strict=True)):
+            return EncoderRejection.BEYOND_LIMITS if np.isfinite(angles).all() else EncoderRejection.NOT_FINITE
         if sample.t_capture_ns > sample.t_arrival_ns + _FUTURE_NS:
             return EncoderRejection.FROM_THE_FUTURE
         newest = self._newest

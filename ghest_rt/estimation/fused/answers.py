@@ -104,7 +104,7 @@ class Answers:
         length = self._arm_length_m
         if length is None:
             base = belief.base[1]
-            length = float(self._along @ (base.slide + base.turn @ belief.gh_in_marker[1] - self._elbow_in_m1))
+            length = float(self._along.dot(base.slide + base.turn.dot(belief.gh_in_marker[1]) - self._elbow_in_m1))
         known = self._explained
         if known is None or known.base is not belief.base or abs(known.length_m - length) > _LENGTH_STEP_M:
             known = self._explained = self._explain(belief, length)

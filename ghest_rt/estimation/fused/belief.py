@@ -127,12 +127,12 @@ class Belief:
     def e_from(self, marker: int) -> Array:
         """Return the (4, 4) pose of m0 (0) or m1 (1) in E, equation (7)."""
         R = self.e_from_marker[marker]
-        return transform(R, self.p_gh - R @ self.gh_in_marker[marker])
+        return transform(R, self.p_gh - R.dot(self.gh_in_marker[marker]))
 
     def shift(self, error: Array) -> None:
         """Move the point by a (24,) error state."""
         m0, m1 = self.e_from_marker
-        self.e_from_marker = (exp_so3(error[ACROMION]) @ m0, exp_so3(error[ARM]) @ m1)
+        self.e_from_marker = (exp_so3(error[ACROMION]).dot(m0), exp_so3(error[ARM]).dot(m1))
         self.p_gh = self.p_gh + error[GH]
         self.rates = self.rates + error[RATES]
         in_m0, in_m1 = self.gh_in_marker
@@ -141,5 +141,5 @@ class Belief:
     def straighten(self, marker: int) -> None:
         """Draw a marker's orientation back onto the rotations (first order): rounding never accumulates."""
         R = self.e_from_marker[marker]
-        straight = R @ (_THREE_HALVES - 0.5 * (R.T @ R))
+        straight = R.dot(_THREE_HALVES - 0.5 * R.T.dot(R))
         self.e_from_marker = (straight, self.e_from_marker[1]) if marker == 0 else (self.e_from_marker[0], straight)

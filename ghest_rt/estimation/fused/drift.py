@@ -1,7 +1,7 @@
 """Has a marker moved on its bone, and where is the bone then? Section 6 of docs/fused-estimator.md."""
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from ghest_rt.estimation.fused.answers import (
     Explained,
 )
 from ghest_rt.estimation.fused.belief import ACROMION, ARM, GH, POSES, Base, Belief
+from ghest_rt.estimation.fused.small import inverse_spd
 from ghest_rt.estimation.fused.tuning import Tuning
 from ghest_rt.estimation.fused.weighing import Weighing
 from ghest_rt.geometry.se3 import transform
@@ -31,7 +32,8 @@ _POSTURE = _BONES + DRIFT_SIZE
 _KNOWN = _BONES + ROWS
 _FOUND = slice(_BONES, _KNOWN)
 _BELIEVED = _BONES + 6
-_TOLD = slice(_BELIEVED, _KNOWN)
+# Diagonal of what is told besides, in the flat covariance.
+_TOLD = slice(_BELIEVED * (_KNOWN + 1), _KNOWN * _KNOWN, _KNOWN + 1)
 # Variance of what is not known, m^2 and rad^2.
 _ANYTHING = 1e2
 _FROM_POSES = np.eye(_POSTURE, _KNOWN)
@@ -42,8 +44,7 @@ _DOUBTFUL = 1e-2
 _BACK_M, _BACK_RAD = 0.003, math.radians(1.0)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Evidence:
+class Evidence(NamedTuple):
     """What is told of m1 besides where the GH centre is in it; axes of m1 as calibrated; None where it is not known.
 
     Attributes:
@@ -63,8 +64,7 @@ class Evidence:
     twist_rad2: float
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Posture:
+class Posture(NamedTuple):
     """The bones, and the drift that was taken out.
 
     Attributes:
@@ -119,7 +119,7 @@ class DriftJudge:
                 found[rows], variance[rows] = value, known
         P = np.zeros((_KNOWN, _KNOWN))
         P[:_BELIEVED, :_BELIEVED] = belief.P[:_BELIEVED, :_BELIEVED]
-        P[_TOLD, _TOLD] = np.diag(variance[6:])
+        P.ravel()[_TOLD] = variance[6:]
         weighing = self._weighing
         anew = weighing.weigh(belief.t_ns, P[_FOUND, _FOUND], explained, found, elbow_known=evidence.elbow_moved is not None)
         weights = weighing.probability
@@ -145,31 +145,30 @@ class DriftJudge:
     def _posture(self, belief: Belief, P: Array, explained: Explained, h: int, found: Array) -> tuple[Array, Array]:
         """Return the (22,) shift and (22, 22) covariance of the posture if answer `h` is the right one."""
         columns = P[:, _FOUND]
-        gain = np.linalg.solve(columns[9:] + explained.spread[h], columns.T).T
-        shift = -(gain @ found)
-        P = P - gain @ columns.T
+        gain = columns.dot(inverse_spd(columns[9:] + explained.spread[h]))
+        shift = -gain.dot(found)
+        P = P - gain.dot(columns.T)
         W = explained.W[h]
         m0, m1 = belief.e_from_marker
         # Errors of the posture from those of the poses and of the GH centre in the markers, and from what W leaves open.
         B, M = _FROM_POSES.copy(), _FROM_DRIFT.copy()
         M[ACROMION, TURN[0]], M[ARM, TURN[1]] = -m0, -m1
-        B[:, 9:] = M @ W
-        drift = W @ (found + shift[9:])
-        mean = M @ drift
+        B[:, 9:] = M.dot(W)
+        mean = M.dot(W.dot(found + shift[9:]))
         mean[POSES] += shift[POSES]
-        return mean, B @ P @ B.T + M @ explained.rest[h] @ M.T
+        return mean, B.dot(P).dot(B.T) + M.dot(explained.rest[h]).dot(M.T)
 
     def _compose(self, belief: Belief, explained: Explained, mean: Array, covariance: Array, weights: Array) -> Posture:
         drift = mean[_BONES:]
-        m0, m1 = (R @ base.turn.T for R, base in zip(belief.e_from_marker, belief.base, strict=True))
+        m0, m1 = (R.dot(base.turn.T) for R, base in zip(belief.e_from_marker, belief.base, strict=True))
         p_gh = belief.p_gh + mean[GH]
-        e_from_gh = transform(exp_so3(mean[ACROMION]) @ m0 @ self._m0_from_gh[:3, :3], p_gh)
-        R_elw = exp_so3(mean[ARM]) @ m1 @ self._m1_from_elw[:3, :3]
+        e_from_gh = transform(exp_so3(mean[ACROMION]).dot(m0).dot(self._m0_from_gh[:3, :3]), p_gh)
+        R_elw = exp_so3(mean[ARM]).dot(m1).dot(self._m1_from_elw[:3, :3])
         e_from_elw = transform(R_elw, p_gh - (explained.length_m + float(drift[LENGTH])) * R_elw[:, 1])
         slides = [base.slide + drift[SLIDE[k]] for k, base in enumerate(belief.base)]
         turns = [_turned(base, drift[TURN[k]]) for k, base in enumerate(belief.base)]
         drifted = [
-            1.0 if base.jumped and not _is_back(slides[k], turns[k]) else float(self._answers.of_marker[k] @ weights)
+            1.0 if base.jumped and not _is_back(slides[k], turns[k]) else float(self._answers.of_marker[k].dot(weights))
             for k, base in enumerate(belief.base)
         ]
         return Posture(
@@ -179,7 +178,7 @@ class DriftJudge:
             (slides[0], slides[1]),
             (turns[0], turns[1]),
             (drifted[0], drifted[1]),
-            float(self._answers.turned @ weights),
+            float(self._answers.turned.dot(weights)),
         )
 
 

@@ -27,6 +27,7 @@ from ghest_rt.estimation.reasons import gravest
 from ghest_rt.estimation.uncertainty import covariance_in_e, euler_sigma_rad
 from ghest_rt.geometry.se3 import inverse
 from ghest_rt.geometry.so3 import Array, log_so3, rot_z
+from ghest_rt.kinematics.paper_chain import eq7_e_from_marker
 from ghest_rt.messages.results import GhEstimate, MarkerObservation, MarkerStatus, Reason, Status
 from ghest_rt.sync.encoder_track import EncoderTrack
 
@@ -139,7 +140,7 @@ class FusedEstimator:
         if e_from_arm is None:
             return lost(t_ns, self._why_unseen(stale, t_ns) if stale else Reason.UNCERTAIN, newest_ns)
         m0_from_gh = self._chain.m0_from_gh
-        m0_from_arm = eq10_m0_from_arm(posture.e_from_gh @ self._gh_from_m0, e_from_arm)
+        m0_from_arm = eq10_m0_from_arm(posture.e_from_gh.dot(self._gh_from_m0), e_from_arm)
         gh_from_arm = gh_from_arm_rotation(m0_from_gh, m0_from_arm)
         slip = self._witness.slip.explained(posture.turned)
         slip_rad, slip_variance = slip.at(twist_rad(gh_from_arm))
@@ -156,7 +157,7 @@ class FusedEstimator:
         drift = drift_report(posture, slip, self._chain.m1_from_elw[:3, 1])
         elbow = self._chain.elbow_angles(e_from_arm, joints.positions, of_arm)
         flagged = drift.m0.flagged or drift.m1.flagged
-        unsettled = belief.slack > _SETTLED_SLACK or math.sqrt(float(covariance.trace())) > self._unsettled_rad
+        unsettled = belief.slack > _SETTLED_SLACK or math.sqrt(sum(covariance.diagonal().tolist())) > self._unsettled_rad
         bridged = bool(stale) or self._freshness.returning() or encoders_overdue(joints.gap_ns)
         reason = self._weakness(gh_from_arm, covariance, bridged, flagged and unsettled)
         return GhEstimate(
@@ -189,7 +190,7 @@ class FusedEstimator:
         return Sighting(
             marker=which,
             t_ns=observation.t_capture_ns,
-            pose=e_from_camera @ observation.camera_from_marker,
+            pose=eq7_e_from_marker(e_from_camera, observation.camera_from_marker),
             covariance=covariance,
             e_from_r1=e_from_r1,
             color_only=observation.status is MarkerStatus.COLOR_ONLY,
@@ -229,7 +230,7 @@ class FusedEstimator:
             turns = [float(np.sum(np.square(log_so3(T[:3, :3] @ here[:3, :3].T)))) for T in there]
             places = [float(np.sum(np.square(T[:3, 3] - here[:3, 3]))) for T in there]
             self._carried = np.array([turns, places]) / (3.0 * _SMALL_STEP**2)
-        turn, place = (self._carried @ joints.variance).tolist()
+        turn, place = self._carried.dot(joints.variance).tolist()
         return turn, place
 
     def _e_from_r1(self, positions: Array) -> Array:

@@ -24,7 +24,7 @@ from ghest_rt.estimation.fused.belief import (
 from ghest_rt.estimation.fused.measurement import Innovation, innovation_of
 from ghest_rt.estimation.fused.process import Process
 from ghest_rt.estimation.fused.sighting import Sighting
-from ghest_rt.estimation.fused.small import inverse_3, whitened_3
+from ghest_rt.estimation.fused.small import inverse_3, inverse_spd, whitened_3
 from ghest_rt.estimation.fused.tuning import Tuning
 from ghest_rt.geometry.so3 import Array
 
@@ -44,7 +44,10 @@ _UNKNOWN_RAD, _UNKNOWN_M, _UNKNOWN_RAD_S, _UNKNOWN_M_S = 0.5, 0.2, 1.0, 0.3
 
 # Diagonal of the positions in a flat (6, 6) matrix.
 _POSITIONS = slice(21, 36, 7)
-_PLACES = (GH, GH_RATE, BOTH_GH)
+# Which error states are places of the GH centre, for rows of a gain.
+_OF_PLACES = np.zeros((SIZE, 1), dtype=bool)
+for _part in (GH, GH_RATE, BOTH_GH):
+    _OF_PLACES[_part] = True
 
 _Item = TypeVar("_Item")
 
@@ -212,16 +215,14 @@ class _Update:
     """
 
     def __init__(self, P: Array, innovation: Innovation, R: Array) -> None:
-        H = innovation.H
-        noise = R.copy()
-        noise.ravel()[_POSITIONS] += innovation.bend_m2
-        self._P, self._H_P = P, H @ P
-        self._residual = innovation.residual
-        self._without_rotation = innovation.without_rotation
-        self.spread = self._H_P @ H.T + noise
-        self._place_spread = self._without_rotation @ self.spread @ self._without_rotation.T
-        self._information = np.linalg.inv(self.spread)
-        self.nis = float(self._residual @ self._information @ self._residual)
+        H, T = innovation.H, innovation.without_rotation
+        self._P, self._H_P = P, H.dot(P)
+        self._residual, self._without_rotation = innovation.residual, T
+        self.spread = self._H_P.dot(H.T) + R
+        self.spread.ravel()[_POSITIONS] += innovation.bend_m2
+        self._place_spread = T.dot(self.spread).dot(T.T)
+        self._information = inverse_spd(self.spread)
+        self.nis = float(self._residual.dot(self._information).dot(self._residual))
 
     def turn_surprise(self) -> Array:
         """Return the (3,) innovation of the rotation, whitened."""
@@ -229,19 +230,21 @@ class _Update:
 
     def place_surprise(self) -> Array:
         """Return the (3,) innovation of the position, judged by the measured rotation, whitened."""
-        return whitened_3(self._place_spread, self._without_rotation @ self._residual)
+        return whitened_3(self._place_spread, self._without_rotation.dot(self._residual))
 
     def apply(self, belief: Belief) -> None:
         """Correct a belief."""
         T, H_P = self._without_rotation, self._H_P
-        gain = (self._information @ H_P).T
-        of_places = ((T.T @ inverse_3(self._place_spread)) @ (T @ H_P)).T
-        for part in _PLACES:
-            gain[part] = of_places[part]
+        gain = self._information.dot(H_P).T
+        of_places = T.T.dot(inverse_3(self._place_spread)).dot(T.dot(H_P)).T
+        np.copyto(gain, of_places, where=_OF_PLACES)
         # Joseph's (1 - K H) P (1 - K H)^T + K R K^T, multiplied out, and its symmetric part.
-        P = self._P + gain @ (self.spread @ gain.T - 2.0 * H_P)
-        belief.P = 0.5 * (P + P.T)
-        belief.shift(gain @ self._residual)
+        P = gain.dot(self.spread.dot(gain.T) - 2.0 * H_P)
+        P += self._P
+        P += P.T
+        P *= 0.5
+        belief.P = P
+        belief.shift(gain.dot(self._residual))
 
 
 def _streak(streak: Streak, t_ns: int, residual: Array) -> Streak:

@@ -1,7 +1,7 @@
 """The joint positions at any instant, a little beyond the newest encoder sample too, and how uncertain they are."""
 
 from collections import deque
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,6 +20,9 @@ _MOST_STEP_NS = 60_000_000
 _LEAST_SAMPLES, _FITTED = 3, 7
 # Lines: shares of the rate over the last step, and over the last two, that go on. Recorded movement of people is jerky.
 _SHARES, _SHARES_OF_TWO = np.array([[0.0], [0.5], [1.0]]), np.array([[0.5], [1.0]])
+# Two parabolas and the lines compete; their mean comes last.
+_FORECASTS = _MEAN = 2 + len(_SHARES) + len(_SHARES_OF_TWO)
+_LINES, _LINES_OF_TWO = slice(2, 2 + len(_SHARES)), slice(2 + len(_SHARES), _FORECASTS)
 # Share of the newest sample in what is known of a forecast's errors.
 _FOLLOW = 0.04
 # Keeps the weights of forecasts without any error finite, rad^2.
@@ -33,8 +36,7 @@ _UNKNOWN_RATE = 1.0
 _ONE_STEP = 60.0
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Joints:
+class Joints(NamedTuple):
     """Joint positions at an instant.
 
     Attributes:
@@ -71,14 +73,12 @@ class JointForecast:
         self._step_s = 0.0
         # How long the encoders were silent before samples that do not suffice for a forecast yet.
         self._gap_ns = 0
-        # (7, 3, n): of each forecast and joint, position, rate and half the acceleration at the newest sample.
+        # (3, 8, n): position, rate and half the acceleration at the newest sample, of each forecast and of their weighted mean.
         self._forecasts: Array | None = None
-        # (7, n): mean squares of the errors of each forecast by one step; None before there are any.
+        # (8, n): mean squares of the errors of each by one step; None before there are any.
         self._errors: Array | None = None
-        # (3, n): the mean of the forecasts, weighted.
-        self._mean: Array | None = None
-        # (n,) mean squares of the errors of a sample, and of the mean forecast by one step.
-        self._of_sample = self._of_step = np.zeros(0)
+        # (n,) mean squares of the errors of a sample.
+        self._of_sample = np.zeros(0)
 
     def add(self, sample: EncoderSample) -> None:
         """Note a sample that the track has taken."""
@@ -96,9 +96,9 @@ class JointForecast:
             # Rows that are missing make no slower link.
             self._step_s = min(max(step_s, self._step_s / 1.1), 1.1 * self._step_s) if self._step_s else step_s
         last.append(sample)
-        self._forecasts = _forecasts(last) if len(last) >= _LEAST_SAMPLES else None
-        self._mean = self._weighted()
-        if self._mean is not None:
+        self._forecasts = None
+        if len(last) >= _LEAST_SAMPLES:
+            self._forecasts = _forecasts(last, self._errors)
             self._gap_ns = 0
 
     def at(self, t_ns: int) -> Joints | None:
@@ -116,7 +116,7 @@ class JointForecast:
         return Joints(self._forecast(ahead_ns * 1e-9), self._ahead(ahead_ns * 1e-9), gap_ns, newest_ns)
 
     def _forecast(self, ahead_s: float) -> Array:
-        if self._mean is None:
+        if self._forecasts is None:
             last = self._last[-1]
             if len(self._last) < 2:
                 return last.angles_rad
@@ -124,8 +124,7 @@ class JointForecast:
             slope = (last.angles_rad - before.angles_rad) / (last.t_capture_ns - before.t_capture_ns)
             return np.asarray(last.angles_rad + (ahead_s * 1e9) * slope)
         curved_s = min(ahead_s, _CURVED_S)
-        position, rate, bend = self._mean
-        return np.asarray(position + ahead_s * rate + curved_s * (2.0 * ahead_s - curved_s) * bend)
+        return np.asarray(np.array((1.0, ahead_s, curved_s * (2.0 * ahead_s - curved_s))).dot(self._forecasts[:, _MEAN]))
 
     def _between(self, gap_s: float) -> Array:
         """Return the variance between two samples: that of a sample, unless some are missing."""
@@ -135,12 +134,14 @@ class JointForecast:
 
     def _ahead(self, ahead_s: float) -> Array:
         """Return the variance of a forecast: it grows from that of a sample, as it has been seen to."""
-        return self._unknown(ahead_s) if self._errors is None or self._mean is None else self._grown(ahead_s)
+        return self._unknown(ahead_s) if self._errors is None or self._forecasts is None else self._grown(ahead_s)
 
     def _grown(self, ahead_s: float) -> Array:
+        if self._errors is None:
+            return self._of_sample
         reach = ahead_s / self._step_s
         growth = reach * reach if reach < 1.0 else reach**4
-        return np.asarray(self._of_sample + growth * self._of_step)
+        return np.asarray(self._of_sample + growth * self._errors[_MEAN])
 
     def _unknown(self, ahead_s: float) -> Array:
         size = len(self._last[-1].angles_rad) if self._last else 0
@@ -148,55 +149,55 @@ class JointForecast:
 
     def _judge(self, sample: EncoderSample, step_s: float) -> None:
         """Learn from what a new sample shows of the forecasts."""
-        if self._forecasts is None or self._mean is None:
+        if self._forecasts is None:
             return
-        missed = _on(self._forecasts, step_s) - sample.angles_rad
-        squares = missed * missed
-        missed = _on(self._mean, step_s) - sample.angles_rad
-        square = missed * missed
+        of_all = self._forecasts.reshape(3, -1)
+        missed = np.array((1.0, step_s, step_s * step_s)).dot(of_all).reshape(_FORECASTS + 1, -1) - sample.angles_rad
+        missed *= missed
         if self._errors is None:
-            self._errors, self._of_step = squares, square
+            self._errors = missed
         else:
-            self._errors = self._errors + _FOLLOW * (squares - self._errors)
-            self._of_step = self._of_step + _FOLLOW * (square - self._of_step)
+            self._errors += _FOLLOW * (missed - self._errors)
         self._of_sample = self._errors[0] * (1.0 / _ONE_STEP)
 
-    def _weighted(self) -> Array | None:
-        if self._forecasts is None or self._errors is None:
-            return None if self._forecasts is None else np.asarray(self._forecasts[0])
-        weights = 1.0 / np.square(self._errors + _LEAST_SQUARE)
-        weights /= weights.sum(axis=0)
-        return np.asarray((weights[:, None] * self._forecasts).sum(axis=0))
 
+def _forecasts(last: deque[EncoderSample], errors: Array | None) -> Array:
+    """Return the (3, 8, n) forecasts, with their mean: position, rate, half the acceleration at the newest sample.
 
-def _on(forecast: Array, ahead_s: float) -> Array:
-    """Return where (..., 3, n) forecasts have the joints, (..., n), a step later."""
-    return np.asarray(forecast[..., 0, :] + ahead_s * forecast[..., 1, :] + (ahead_s * ahead_s) * forecast[..., 2, :])
-
-
-def _forecasts(last: deque[EncoderSample]) -> Array:
-    """Return the (7, 3, n) competing forecasts: position, rate, half the acceleration at the newest sample."""
+    Args:
+        last: At least three samples.
+        errors: (8, n) mean squares of the errors so far, of which the weights follow; without, the mean is the first forecast.
+    """
     newest, before, earlier = last[-1], last[-2], last[-3]
-    ago_s, ago_2_s = ((sample.t_capture_ns - newest.t_capture_ns) * 1e-9 for sample in (before, earlier))
+    ago_s, ago_2_s = (before.t_capture_ns - newest.t_capture_ns) * 1e-9, (earlier.t_capture_ns - newest.t_capture_ns) * 1e-9
     rate = (before.angles_rad - newest.angles_rad) / ago_s
     rate_of_two = (earlier.angles_rad - newest.angles_rad) / ago_2_s
-    found = np.zeros((2 + len(_SHARES) + len(_SHARES_OF_TWO), 3, len(newest.angles_rad)))
-    found[:, 0] = newest.angles_rad
     bend = (rate_of_two - rate) / (ago_2_s - ago_s)
-    found[0, 1], found[0, 2] = rate - ago_s * bend, bend
-    found[1] = _parabola(last)
-    lines = found[2:, 1]
-    lines[: len(_SHARES)] = _SHARES * rate
-    lines[len(_SHARES) :] = _SHARES_OF_TWO * rate_of_two
+    found = np.zeros((3, _FORECASTS + 1, len(bend)))
+    found[0] = newest.angles_rad
+    found[1, 0], found[2, 0] = rate - ago_s * bend, bend
+    found[:, 1] = _parabola(last)
+    found[1, _LINES] = _SHARES * rate
+    found[1, _LINES_OF_TWO] = _SHARES_OF_TWO * rate_of_two
+    if errors is None:
+        found[:, _MEAN] = found[:, 0]
+    else:
+        weights = errors[:_FORECASTS] + _LEAST_SQUARE
+        weights *= weights
+        np.reciprocal(weights, out=weights)
+        weights /= np.add.reduce(weights)
+        found[:, _MEAN] = np.add.reduce(weights * found[:, :_FORECASTS], axis=1)
     return found
 
 
 def _parabola(samples: deque[EncoderSample]) -> Array:
     """Return the (3, n) parabola fitted to all the samples: position, rate, half the acceleration at the newest."""
     newest_ns = samples[-1].t_capture_ns
-    t = np.array([(sample.t_capture_ns - newest_ns) * 1e-9 for sample in samples])
-    A = np.array([np.ones(len(samples)), t, t * t])
     # Times in units of the span, so that the normal matrix is well scaled.
-    scale = np.array([[1.0], [-1.0 / t[0]], [1.0 / (t[0] * t[0])]])
-    A *= scale
-    return np.asarray(scale * (inverse_3(A @ A.T) @ (A @ np.array([sample.angles_rad for sample in samples]))))
+    per_span = 1.0 / (samples[0].t_capture_ns - newest_ns)
+    A = np.ones((3, len(samples)))
+    A[1] = t = np.array([(sample.t_capture_ns - newest_ns) * per_span for sample in samples])
+    A[2] = t * t
+    found = inverse_3(A.dot(A.T)).dot(A).dot(np.array([sample.angles_rad for sample in samples]))
+    per_s = 1e9 * per_span
+    return np.asarray(np.array(((1.0,), (per_s,), (per_s * per_s,))) * found)

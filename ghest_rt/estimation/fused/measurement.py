@@ -1,18 +1,16 @@
 """What a belief foretells of a marker's pose, and how that depends on the error state; section 3 of docs/fused-estimator.md."""
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from ghest_rt.estimation.fused.belief import ACROMION, ARM, GH, GH_IN_MARKER, SIZE, Belief
 from ghest_rt.geometry.so3 import Array, log_so3, skew
 
-_EYE_3 = np.eye(3)
 _ROTATION = (ACROMION, ARM)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Innovation:
+class Innovation(NamedTuple):
     """A measurement compared with what was foretold.
 
     Attributes:
@@ -38,19 +36,29 @@ def innovation_of(belief: Belief, marker: int, e_from_marker: Array) -> Innovati
         marker: 0 for m0, 1 for m1.
         e_from_marker: (4, 4) as measured, equation (7).
     """
-    R = belief.e_from_marker[marker]
-    lever = R @ belief.gh_in_marker[marker]
-    H = np.zeros((6, SIZE))
-    H[:3, _ROTATION[marker]] = H[3:, GH] = _EYE_3
-    H[3:, _ROTATION[marker]] = skew(lever)
+    R, in_marker, turn = belief.e_from_marker[marker], belief.gh_in_marker[marker], _ROTATION[marker]
+    across = skew(R.dot(in_marker))
+    H = _PLAIN[marker].copy()
+    H[3:, turn] = across
     H[3:, GH_IN_MARKER[marker]] = -R
-    residual = np.empty(6)
     measured = e_from_marker[:3, :3]
-    residual[:3] = log_so3(measured @ R.T)
-    across = H[3:, _ROTATION[marker]]
+    residual = np.empty(6)
+    residual[:3] = turned = log_so3(measured.dot(R.T))
     # The GH centre by the measured rotation, and what the believed one makes of that to first order.
-    residual[3:] = e_from_marker[:3, 3] - belief.p_gh + measured @ belief.gh_in_marker[marker] + across @ residual[:3]
+    residual[3:] = e_from_marker[:3, 3] - belief.p_gh + measured.dot(in_marker) + across.dot(turned)
     variance = belief.P.diagonal().tolist()
-    bend = sum(variance[_ROTATION[marker]]) * sum(variance[GH_IN_MARKER[marker]]) / 3.0
-    without_rotation = np.concatenate((-across, _EYE_3), axis=1)
+    bend = sum(variance[turn]) * sum(variance[GH_IN_MARKER[marker]]) / 3.0
+    without_rotation = _ONLY_PLACE.copy()
+    without_rotation[:, :3] = across.T
     return Innovation(residual, H, bend, without_rotation)
+
+
+def _plain(marker: int) -> Array:
+    """Return the (6, 24) part of H that never changes."""
+    H = np.zeros((6, SIZE))
+    H[:3, _ROTATION[marker]] = H[3:, GH] = np.eye(3)
+    return H
+
+
+_PLAIN = (_plain(0), _plain(1))
+_ONLY_PLACE = np.eye(3, 6, 3)

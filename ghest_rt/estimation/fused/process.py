@@ -6,7 +6,7 @@ import numpy as np
 
 from ghest_rt.estimation.fused.belief import ACROMION, ARM, BOTH_GH, GH, GH_IN_MARKER, GH_RATE, POSES, RATES, SIZE, Belief
 from ghest_rt.estimation.fused.tuning import Tuning
-from ghest_rt.geometry.so3 import Array, exp_so3, quat_wxyz, skew
+from ghest_rt.geometry.so3 import Array, exp_so3, quat_wxyz, rotation, skew
 
 # A marker not seen for this long is bridged: its body may do what it has not done before.
 _UNSEEN_NS = 80_000_000
@@ -41,7 +41,7 @@ class Process:
         self._bridging = tuning.bridging_agility
         self._jerk_s, self._jerky_agility = tuning.jerk_s, tuning.jerky_agility
         density = np.repeat((tuning.rotation_density, tuning.position_density, tuning.rotation_density), 3)
-        self._density = density * _OF_M0, density * (1.0 - _OF_M0)
+        self._density = np.array([density * _OF_M0, density * (1.0 - _OF_M0)])
         self._loose_m2_s = tuning.loose_m2_s
         self._creep = np.empty(6)
         for part, creep in zip(GH_IN_MARKER, tuning.creep_m2_s, strict=True):
@@ -66,11 +66,11 @@ class Process:
         move = carry * belief.rates
         p_gh = belief.p_gh + move[GH]
         m0, m1 = belief.e_from_marker
-        upper_arm = m1 @ (belief.gh_in_marker[1] - self._elbow_in_m1)
+        upper_arm = m1.dot(belief.gh_in_marker[1] - self._elbow_in_m1)
         follow, turned_rad = follow_encoders(belief, upper_arm, p_gh, e_from_r1)
         smoothing = min(dt / _SPEED_MEMORY_S, 1.0)
         belief.speed_rad_s += smoothing * (turned_rad / dt - belief.speed_rad_s)
-        belief.e_from_marker = (exp_so3(move[ACROMION]) @ m0, exp_so3(move[ARM]) @ follow @ m1)
+        belief.e_from_marker = (exp_so3(move[ACROMION]).dot(m0), exp_so3(move[ARM]).dot(follow).dot(m1))
         belief.p_gh = p_gh
         belief.rates = decay * belief.rates
         belief.e_from_r1 = e_from_r1
@@ -79,8 +79,8 @@ class Process:
         diagonal[_POSE_RATE] = carry
         diagonal[_RATE] = decay
         F[ARM, ARM] = follow
-        F[ARM, GH_RATE] = skew((carry / float(upper_arm @ upper_arm)) * upper_arm)
-        belief.P = F @ belief.P @ F.T
+        F[ARM, GH_RATE] = skew(upper_arm * (carry / float(upper_arm.dot(upper_arm))))
+        belief.P = F.dot(belief.P).dot(F.T)
         self._disturb(belief, dt, decay, t_ns, doubt)
         belief.t_ns = t_ns
 
@@ -90,22 +90,23 @@ class Process:
         fresh = 0.5 * tau * (1.0 - decay * decay)
         carry = tau * (1.0 - decay)
         smooth, jerky = tau * tau * (dt - 2.0 * carry + fresh), dt * self._jerk_s * self._jerk_s
-        driven, posed = np.zeros(9), np.zeros(9)
-        for which, density in enumerate(self._density):
-            agility = self._agility(belief, which, t_ns)
-            # Quick movement is also jerky: part of what a pose does is none of its rate's doing.
-            jerk = jerky * agility / (agility + self._jerky_agility)
-            driven = driven + (doubt * agility) * density
-            posed = posed + (doubt * agility * (smooth + jerk)) * density
-        diagonal = belief.P.ravel()
-        diagonal[_POSE] += posed
-        diagonal[_RATE] += fresh * driven
-        cross = (0.5 * carry * carry) * driven
-        diagonal[_POSE_RATE] += cross
-        diagonal[_RATE_POSE] += cross
-        creep = diagonal[_GH]
-        if creep.max() < self._most:
-            creep += dt * (belief.slack * self._creep + max(belief.slack - _CLEAR_SLACK, 0.0) * self._loose_m2_s)
+        agility_0, agility_1 = self._agility(belief, 0, t_ns), self._agility(belief, 1, t_ns)
+        # Quick movement is also jerky: part of what a pose does is none of its rate's doing.
+        pose_0 = smooth + jerky * agility_0 / (agility_0 + self._jerky_agility)
+        pose_1 = smooth + jerky * agility_1 / (agility_1 + self._jerky_agility)
+        cross = 0.5 * carry * carry
+        driven_0, driven_1 = doubt * agility_0, doubt * agility_1
+        posed, rated, crossed = np.array(
+            [[driven_0 * pose_0, driven_1 * pose_1], [driven_0 * fresh, driven_1 * fresh], [driven_0 * cross, driven_1 * cross]]
+        ).dot(self._density)
+        flat_P = belief.P.ravel()
+        flat_P[_POSE] += posed
+        flat_P[_RATE] += rated
+        flat_P[_POSE_RATE] += crossed
+        flat_P[_RATE_POSE] += crossed
+        creep = flat_P[_GH]
+        if max(creep.tolist()) < self._most:
+            creep += (dt * belief.slack) * self._creep + dt * max(belief.slack - _CLEAR_SLACK, 0.0) * self._loose_m2_s
 
     def _agility(self, belief: Belief, which: int, t_ns: int) -> float:
         unseen = t_ns - belief.seen_ns[which] > _UNSEEN_NS
@@ -125,8 +126,8 @@ def follow_encoders(belief: Belief, upper_arm: Array, p_gh: Array, e_from_r1: Ar
         e_from_r1: (4, 4) camera r1 after it.
     """
     before = belief.e_from_r1
-    moved = e_from_r1[:3, :3] @ before[:3, :3].T
-    p_elbow = moved @ (belief.p_gh - upper_arm - before[:3, 3]) + e_from_r1[:3, 3]
+    moved = e_from_r1[:3, :3].dot(before[:3, :3].T)
+    p_elbow = moved.dot(belief.p_gh - upper_arm - before[:3, 3]) + e_from_r1[:3, 3]
     ax, ay, az = _unit(upper_arm)
     bx, by, bz = _unit(p_gh - p_elbow)
     # Shortest rotation from V to W: I + [c]x + [c]x^2 / (1 + V.W), c = V x W.
@@ -142,8 +143,7 @@ def follow_encoders(belief: Belief, upper_arm: Array, p_gh: Array, e_from_r1: Ar
     )
     w, x, y, z = quat_wxyz(moved)
     twist = 2.0 * math.atan2(x * ax + y * ay + z * az, w)
-    follow = np.asarray(swing @ exp_so3(np.array([twist * ax, twist * ay, twist * az])))
-    return follow, 2.0 * math.atan2(math.sqrt(x * x + y * y + z * z), w)
+    return swing.dot(rotation(twist * ax, twist * ay, twist * az)), 2.0 * math.atan2(math.sqrt(x * x + y * y + z * z), w)
 
 
 def _unit(v: Array) -> tuple[float, float, float]:

@@ -46,4 +46,4 @@ def rotation_covariance(posture: Posture) -> Array:
     """Return the (3, 3) covariance of the error of gh_from_arm: epsilon = gh_from_e (phi_humerus - phi_scapula)."""
     P, gh_from_e = posture.covariance, posture.e_from_gh[:3, :3].T
     cross = P[ACROMION, ARM]
-    return np.asarray(gh_from_e @ (P[ACROMION, ACROMION] + P[ARM, ARM] - cross - cross.T) @ gh_from_e.T)
+    return np.asarray(gh_from_e.dot(P[ACROMION, ACROMION] + P[ARM, ARM] - cross - cross.T).dot(gh_from_e.T))

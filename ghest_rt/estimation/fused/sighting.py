@@ -1,12 +1,11 @@
 """A marker seen: what the filter takes in."""
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from ghest_rt.geometry.so3 import Array
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Sighting:
+class Sighting(NamedTuple):
     """One marker's pose in one frame.
 
     Attributes:

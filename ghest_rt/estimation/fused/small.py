@@ -1,7 +1,8 @@
-"""3 x 3 algebra on plain floats: at this size a call into a linear algebra library costs more than the arithmetic."""
+"""Algebra of small matrices: at this size what a call into numpy.linalg checks costs more than the arithmetic."""
 
 import math
 
+import cv2
 import numpy as np
 
 from ghest_rt.geometry.so3 import Array
@@ -19,6 +20,12 @@ def inverse_3(M: Array) -> Array:
             [k * C, k * (b * g - a * h), k * (a * e - b * d)],
         ]
     )
+
+
+def inverse_spd(M: Array) -> Array:
+    """Return the inverse of a positive definite (n, n) matrix, by Cholesky's factors; by LU if rounding spoils them."""
+    positive, inverse = cv2.invert(M, flags=cv2.DECOMP_CHOLESKY)
+    return np.asarray(inverse if positive else np.linalg.inv(M), dtype=np.float64)
 
 
 def whitened_3(covariance: Array, v: Array) -> Array:

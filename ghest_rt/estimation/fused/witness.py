@@ -71,15 +71,15 @@ class Witness:
 
     def evidence(self, belief: Belief) -> Evidence:
         """Return what is told of m1, in its axes as calibrated."""
-        marker_from_r1 = belief.base[1].turn @ belief.e_from_marker[1].T @ belief.e_from_r1[:3, :3]
+        marker_from_r1 = belief.base[1].turn.dot(belief.e_from_marker[1].T).dot(belief.e_from_r1[:3, :3])
         elbow, reference = self._elbow, self._reference
         moved = first = None
         moved_m2 = 0.0
         if elbow.ready:
             # It wanders with the arm's attitude in r1: the arm's axis and the exoskeleton's are apart.
             apart = elbow.recent - elbow.first
-            moved = marker_from_r1 @ apart[:3]
-            moved_m2 = self._tuning.elbow_m**2 + self._tuning.elbow_lever_m**2 * float(apart[3:] @ apart[3:])
+            moved = marker_from_r1.dot(apart[:3])
+            moved_m2 = self._tuning.elbow_m**2 + self._tuning.elbow_lever_m**2 * float(apart[3:].dot(apart[3:]))
         if elbow.started and reference.elbow_m is not None:
             first = marker_from_r1 @ (elbow.first[:3] - reference.elbow_m)
         twist_rad, twist_rad2 = self._axial.turned() or (None, 0.0)
