@@ -115,6 +115,18 @@ def test_a_returned_pose_may_be_written_to() -> None:
         np.testing.assert_array_equal(fk.link_pose(link, np.array([0.2])), before)
 
 
+def test_positions_that_have_been_written_to_are_another_posture() -> None:
+    text = (HERE / "nine_joints.urdf").read_text()
+    fk = ForwardKinematics(text, "nine_joints.urdf", base_link="base", links=["a"], settings_m={}, measured_joints=["j0"])
+    position = np.array([0.2])
+    before = fk.link_pose("a", position)
+    position[0] = 0.7
+    there = fk.link_pose("a", position)
+    assert np.abs(there - before).max() > 0.1
+    np.testing.assert_array_equal(fk.link_pose("a", np.array([0.7])), there)
+    np.testing.assert_array_equal(fk.link_pose("a", np.array([0.2])), before)
+
+
 def test_limits_are_those_of_the_urdf_in_the_order_measured() -> None:
     text = (HERE / "nine_joints.urdf").read_text()
     fk = ForwardKinematics(text, "nine_joints.urdf", base_link="base", links=["b"], settings_m={}, measured_joints=["j1", "j0"])

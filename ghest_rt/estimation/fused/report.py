@@ -30,14 +30,18 @@ def drift_report(posture: Posture, slip: Slip, along: Array) -> DriftReport:
         turn_rad=posture.turn[0],
         turn_sigma_rad=sigma[TURN[0]],
     )
+    turn, turn_sigma = posture.turn[1], sigma[TURN[1]]
+    slip_rad, slip_variance = slip.shift_rad + slip.offset_rad, slip.shift_variance + slip.offset_variance
+    if slip_rad or slip_variance:
+        turn, turn_sigma = turn - slip_rad * along, np.sqrt(np.square(turn_sigma) + slip_variance * np.square(along))
     probability = 1.0 - (1.0 - posture.drifted[1]) * (1.0 - slip.shifted) * (1.0 - slip.offset_there)
     m1 = MarkerDrift(
         flagged=probability > _FLAG,
         probability=probability,
         slide_m=posture.slide[1],
         slide_sigma_m=sigma[SLIDE[1]],
-        turn_rad=posture.turn[1] - (slip.shift_rad + slip.offset_rad) * along,
-        turn_sigma_rad=np.sqrt(np.square(sigma[TURN[1]]) + (slip.shift_variance + slip.offset_variance) * np.square(along)),
+        turn_rad=turn,
+        turn_sigma_rad=turn_sigma,
     )
     return DriftReport(m0, m1)
 
