@@ -1,6 +1,5 @@
 """`ghest-rt decrypt` and `ghest-rt recording-key`: sealed recordings, and the keys that open them."""
 
-import sys
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
@@ -18,7 +17,8 @@ def decrypt(sealed: Sequence[Path], key: Path, out: Path | None) -> None:
     """Restore sealed recordings beside themselves, or in another folder.
 
     Raises:
-        BadInputError: A file is not sealed, not for this key or not readable; a restored file exists already.
+        BadInputError: A file is not sealed, not for this key or not readable; a restored file exists already; or a file was cut
+            off or changed: then all that comes before is restored, and every other file, before this is raised.
         GhestError: The extra `security` is not installed.
     """
     need_extra("security", "a sealed recording")
@@ -26,6 +26,7 @@ def decrypt(sealed: Sequence[Path], key: Path, out: Path | None) -> None:
 
     keys = load_keys(key)
     paths = [path for given in sealed for path in _files(given)]
+    broken: list[str] = []
     columns = (TextColumn("{task.description}"), BarColumn(), DownloadColumn(), TimeRemainingColumn())
     console = Console(stderr=True)
     with Progress(*columns, console=console, disable=not console.is_terminal, transient=True) as bar:
@@ -39,7 +40,9 @@ def decrypt(sealed: Sequence[Path], key: Path, out: Path | None) -> None:
             restored = unseal(path, folder / name, keys, partial(_advance, bar, task))
             typer.echo(f"{restored.path}: {restored.size_bytes / 1e6:.1f} MB")
             if not restored.whole:
-                sys.stderr.write(f"{path}: cut off or changed after that; what comes before is restored and can be read\n")
+                broken.append(f"{path}: cut off or changed; {restored.path} holds what comes before, and can be read")
+    if broken:
+        raise BadInputError("\n".join(broken))
 
 
 def recording_key(out: Path) -> None:

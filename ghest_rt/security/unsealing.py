@@ -36,7 +36,6 @@ def load_keys(path: Path) -> Identities:
     Raises:
         BadInputError: The file is missing, readable by others, or holds none. Never shows what is in it.
     """
-    check_secret(path)
     lines = read_small(path, "secret key").decode(errors="replace").splitlines()
     keys = [line.strip() for line in lines if line.strip() and not line.startswith("#")]
     try:
@@ -45,6 +44,7 @@ def load_keys(path: Path) -> Identities:
         found = []
     if not found:
         raise BadInputError(f"{path}: holds no secret key (AGE-SECRET-KEY-1…); take the file that ghest-rt recording-key wrote")
+    check_secret(path)
     return found
 
 

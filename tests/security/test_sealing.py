@@ -141,6 +141,10 @@ def test_keys_that_cannot_be_used_are_refused(tmp_path: Path, key: Key) -> None:
     key.path.chmod(0o644)
     with pytest.raises(BadInputError, match="chmod 600"):
         load_keys(key.path)
+    (recording,) = record(tmp_path / "plain", (), samples=3)
+    recording.chmod(0o644)
+    with pytest.raises(BadInputError, match="holds no secret key"):  # and no advice to guard what is none
+        load_keys(recording)
     empty = tmp_path / "empty.txt"
     empty.touch(0o600)
     with pytest.raises(BadInputError, match="holds no secret key"):
@@ -158,6 +162,20 @@ def test_the_commands(tmp_path: Path) -> None:
     assert len(messages(tmp_path / "open" / sealed.name.removesuffix(".age"))) == 9
     with pytest.raises(BadInputError, match="exists already"):
         run.invoke(app, arguments, catch_exceptions=False)
+
+
+def test_the_command_keeps_what_comes_before_a_change_and_ends_with_an_error(tmp_path: Path, key: Key) -> None:
+    first, second = (record(tmp_path / name, (key.public,))[0] for name in ("a", "b"))
+    data = first.read_bytes()
+    first.write_bytes(data[:700_000] + bytes([data[700_000] ^ 1]) + data[700_001:])
+    second = second.rename(tmp_path / "other.mcap.age")
+    command = [*COMMAND, "decrypt", str(first), str(second), "--key", str(key.path), "--out", str(tmp_path / "open")]
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    assert ended.returncode == 2
+    assert f"{first}: cut off or changed" in ended.stderr
+    assert messages(tmp_path / "open" / "other.mcap") == messages(open_sealed(second, key, tmp_path / "whole.mcap"))
+    kept = (tmp_path / "open" / first.name.removesuffix(".age")).stat().st_size
+    assert 600_000 < kept < (tmp_path / "open" / "other.mcap").stat().st_size
 
 
 @pytest.mark.parametrize("pseudonym", ["P-0042", "P0042", "AB-17", "XYZ-99999"])

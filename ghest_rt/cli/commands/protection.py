@@ -51,7 +51,10 @@ def decrypt(
     key: Annotated[Path, typer.Option(metavar="FILE", help="Secret key", show_default=False)],
     out: Annotated[Path | None, typer.Option(metavar="FOLDER", help="Where to, if not beside them", show_default=False)] = None,
 ) -> None:
-    """Open sealed recordings (needs the extra 'security')."""
+    """Open sealed recordings (needs the extra 'security').
+
+    A file that was cut off or changed is restored up to there, and the exit code is 2.
+    """
     from ghest_rt.cli.decrypt import decrypt as open_sealed
 
     open_sealed(sealed, key, out)
