@@ -58,6 +58,8 @@ def load_access(path: Path) -> AccessList:
     Raises:
         BadInputError: It is missing or is none.
     """
+    if not path.exists():
+        raise BadInputError(f"{path}: no such file; copy {ACCESS_FILE} of the authority's folder there")
     try:
         return AccessList.model_validate_json(read_small(path, "access list"))
     except ValidationError as error:

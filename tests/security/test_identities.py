@@ -151,7 +151,11 @@ def _swap(name: str) -> Callable[[Path, Path], None]:
         (lambda folder, _: (folder / "key.pem").unlink(), NOW, ["key.pem", "No such file"]),
         (lambda folder, _: (folder / "key.pem").write_text("x"), NOW, ["key.pem", "not an unencrypted private key"]),
         (lambda folder, _: (folder / "certificate.pem").write_text("x"), NOW, ["certificate.pem", "not a certificate"]),
-        (lambda folder, _: (folder / "access.json").unlink(), NOW, ["access.json", "cannot read the access list"]),
+        (
+            lambda folder, _: (folder / "access.json").unlink(),
+            NOW,
+            ["access.json", "no such file; copy access.json of the authority"],
+        ),
         (lambda folder, _: (folder / "access.json").write_text("{}"), NOW, ["access.json", "not an access list"]),
         (lambda folder, _: (folder / "ca.pem").write_bytes(bytes(2_000_000)), NOW, ["ca.pem", "larger than 1000000 bytes"]),
     ],
