@@ -2,6 +2,7 @@
 
 import importlib.util
 
+from ghest_drivers.installing import pip_install
 from ghest_rt.errors import GhestError
 
 _SIM = ("mujoco", "mink", "scipy")
@@ -42,4 +43,4 @@ def need_extra(extra: str, what: str) -> None:
     """
     missing = missing_modules(extra)
     if missing:
-        raise GhestError(f"{what} needs {', '.join(missing)}: pip install 'ghest-rt[{extra}]'")
+        raise GhestError(f"{what} needs {', '.join(missing)}: {pip_install(extra)}")

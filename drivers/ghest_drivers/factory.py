@@ -12,6 +12,7 @@ from typing import Any
 
 from ghest_drivers.clock import Clock
 from ghest_drivers.errors import DeviceNotFound
+from ghest_drivers.installing import pip_install
 from ghest_drivers.interfaces import EncoderLink, RgbdCamera
 
 
@@ -88,10 +89,9 @@ def _make(what: str, table: Mapping[str, Backend], name: str, arguments: Mapping
     # Found out here, not when the device opens: a device may come back, a library will not, so nobody should wait for it.
     missing = [library for library in backend.libraries if importlib.util.find_spec(library) is None]
     if missing:
-        raise DeviceNotFound(f"{what} backend {name} needs {', '.join(missing)}: pip install 'ghest-rt[{backend.extra}]'")
+        raise DeviceNotFound(f"{what} backend {name} needs {', '.join(missing)}: {pip_install(backend.extra)}")
     try:
         module = importlib.import_module(backend.module)
     except ImportError as error:
-        remedy = f"install ghest-rt[{backend.extra}]" if backend.extra else "install ghest-rt again"
-        raise DeviceNotFound(f"{what} backend {name} lacks a library ({error}): {remedy}") from error
+        raise DeviceNotFound(f"{what} backend {name} lacks a library ({error}): {pip_install(backend.extra)}") from error
     return getattr(module, backend.maker)(**arguments)

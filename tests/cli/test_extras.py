@@ -21,7 +21,7 @@ def test_every_extra_of_the_project_is_known() -> None:
 @pytest.mark.parametrize("extra", MODULES_OF_EXTRA)
 def test_a_missing_extra_is_told_by_name_and_remedy(extra: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
-    with pytest.raises(GhestError, match=rf"this needs .*: pip install 'ghest-rt\[{extra}\]'") as caught:
+    with pytest.raises(GhestError, match=rf"this needs .*: pip install .*\[{extra}\]") as caught:
         need_extra(extra, "this")
     assert caught.value.exit_code == 1
     assert all(module in str(caught.value) for module in MODULES_OF_EXTRA[extra])

@@ -8,6 +8,7 @@ import socket
 import sys
 from collections.abc import Iterable, Iterator
 
+from ghest_drivers.installing import pip_install
 from ghest_rt import __version__
 from ghest_rt.cli.doctor.findings import Finding, missing, note, ok
 from ghest_rt.extras import MODULES_OF_EXTRA, missing_modules
@@ -47,9 +48,9 @@ def check_extras(needed: Iterable[str]) -> Iterator[Finding]:
             yield ok(check, ", ".join(f"{name} {_version(name)}" for name in modules))
         elif extra in needed:
             exit_code = 3 if extra in _DEVICE_EXTRAS else 1
-            yield missing(check, f"not installed: {', '.join(absent)}", f"pip install 'ghest-rt[{extra}]'", exit_code)
+            yield missing(check, f"not installed: {', '.join(absent)}", pip_install(extra), exit_code)
         else:
-            yield note(check, "not installed", f"pip install 'ghest-rt[{extra}]', if it is wanted")
+            yield note(check, "not installed", f"{pip_install(extra)}, if it is wanted")
 
 
 def _version(module: str) -> str:

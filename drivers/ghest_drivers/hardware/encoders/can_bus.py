@@ -15,6 +15,7 @@ from ghest_drivers.clock import Clock
 from ghest_drivers.errors import DeviceLost, DeviceNotFound, DriverError
 from ghest_drivers.hardware.encoders.handoff import Handoff
 from ghest_drivers.hardware.encoders.stats import LinkStats, Rejection
+from ghest_drivers.installing import pip_install
 
 _POLL_S = 0.05
 _NS_PER_S = 1_000_000_000
@@ -68,7 +69,7 @@ def open_bus(settings: CanBusSettings) -> Any:
     try:
         import can  # noqa: PLC0415 - only where this backend is chosen
     except ImportError as error:
-        raise DeviceNotFound("CAN encoders need python-can: pip install 'ghest-rt[can]'") from error
+        raise DeviceNotFound(f"CAN encoders need python-can: {pip_install('can')}") from error
     options: dict[str, Any] = dict(settings.options)
     if settings.bitrate is not None:
         options["bitrate"] = settings.bitrate

@@ -12,6 +12,7 @@ from ghest_drivers.hardware.encoders.channels import Channel
 from ghest_drivers.hardware.encoders.checksums import crc8_j1850
 from ghest_drivers.hardware.encoders.reading import RawReading
 from ghest_drivers.hardware.encoders.stats import LinkStats, Rejection
+from ghest_drivers.installing import pip_install
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,7 +180,7 @@ def _load(dbc_text: str) -> Any:
     try:
         import cantools  # noqa: PLC0415 - only where this backend is chosen
     except ImportError as error:
-        raise DeviceNotFound("CAN encoders need cantools: pip install 'ghest-rt[can]'") from error
+        raise DeviceNotFound(f"CAN encoders need cantools: {pip_install('can')}") from error
     try:
         return cantools.database.load_string(dbc_text, "dbc")
     except Exception as error:  # cantools and its parser raise several unrelated types

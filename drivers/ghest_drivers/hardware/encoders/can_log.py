@@ -12,6 +12,7 @@ from ghest_drivers.hardware.encoders.can_layout import CanDecoder, CanLayout
 from ghest_drivers.hardware.encoders.channels import Channel
 from ghest_drivers.hardware.encoders.file_link import FileEncoderLink
 from ghest_drivers.hardware.encoders.stats import LinkStats, Rejection
+from ghest_drivers.installing import pip_install
 from ghest_drivers.samples import EncoderSample
 
 _NS_PER_S = 1_000_000_000
@@ -71,7 +72,7 @@ def _messages(path: Path) -> Iterator[Any]:
     try:
         import can  # noqa: PLC0415 - only where this backend is chosen
     except ImportError as error:
-        raise DeviceNotFound("CAN logs need python-can: pip install 'ghest-rt[can]'") from error
+        raise DeviceNotFound(f"CAN logs need python-can: {pip_install('can')}") from error
     try:
         with can.LogReader(str(path)) as reader:
             yield from reader

@@ -22,6 +22,7 @@ from ghest_drivers.hardware.encoders.channels import Channel
 from ghest_drivers.hardware.encoders.handoff import Handoff
 from ghest_drivers.hardware.encoders.link import SampleQueueLink
 from ghest_drivers.hardware.encoders.reading import RawReading
+from ghest_drivers.installing import pip_install
 
 _PRE_OPERATIONAL_COMMAND = 0x80
 _START_COMMAND = 0x01
@@ -112,7 +113,7 @@ class CanopenEncoderLink(SampleQueueLink):
             import canopen  # noqa: PLC0415 - only where this backend is chosen
             from canopen.sdo.exceptions import SdoError  # noqa: PLC0415 - likewise
         except ImportError as error:
-            raise DeviceNotFound("CANopen encoders need canopen: pip install 'ghest-rt[can]'") from error
+            raise DeviceNotFound(f"CANopen encoders need canopen: {pip_install('can')}") from error
         self._network = canopen.Network(bus)
         nodes = {}
         for node_id in self._settings.node_ids:

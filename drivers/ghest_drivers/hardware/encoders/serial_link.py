@@ -19,6 +19,7 @@ from ghest_drivers.hardware.encoders.handoff import Handoff
 from ghest_drivers.hardware.encoders.link import SampleQueueLink
 from ghest_drivers.hardware.encoders.reading import RawReading
 from ghest_drivers.hardware.encoders.text_line import TextFormat, TextLineDecoder
+from ghest_drivers.installing import pip_install
 
 _READ_BYTES = 65536
 _POLL_S = 0.05
@@ -125,7 +126,7 @@ class SerialEncoderLink(SampleQueueLink):
         try:
             import serial  # noqa: PLC0415 - only where this backend is chosen
         except ImportError as error:
-            raise DeviceNotFound("the serial encoder link needs pyserial: pip install 'ghest-rt[serial]'") from error
+            raise DeviceNotFound(f"the serial encoder link needs pyserial: {pip_install('serial')}") from error
         options: dict[str, Any] = {} if "://" in self._settings.port else {"exclusive": True}
         try:
             port = serial.serial_for_url(self._settings.port, baudrate=self._settings.baud, timeout=_POLL_S, **options)
