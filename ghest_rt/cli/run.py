@@ -28,6 +28,7 @@ from ghest_rt.service.loop import Service
 from ghest_rt.service.notify import service_manager
 from ghest_rt.service.outputs import Output
 from ghest_rt.service.run import run_service
+from ghest_rt.service.station_check import check_station
 from ghest_rt.service.stop_signals import StopSignals
 from ghest_rt.vision.station import Method as PipelineMethod
 
@@ -75,12 +76,13 @@ def run_station(options: RunOptions) -> None:
     manager = service_manager()
     station = load_station(options.station)
     _refuse_replay(station.config, options.station)
+    method: PipelineMethod = options.method.value if options.method is not None else station.config.estimator.method
+    check_station(station, method=method, publish=options.publish, listen=options.listen)
     clock = ScaledClock()
     world = _world(station, options, clock.now_ns() + _SIM_LEAD_NS)
     if world is not None:
         station = world.station
     config = station.config
-    method: PipelineMethod = options.method.value if options.method is not None else config.estimator.method
     cameras, encoders = make_devices(station, clock, world.device_settings if world is not None else {})
     scoreboard = world.scoreboard if world is not None else Scoreboard()
     with (
@@ -155,7 +157,7 @@ def _metrics(config: StationConfig) -> "AbstractContextManager[MetricsEndpoint |
 
 def _world(station: LoadedStation, options: RunOptions, start_ns: int) -> "LiveWorld | None":
     device = station.config.cameras["r0"].device
-    if not uses_simulation(station.config) or not isinstance(device, SimBackend):
+    if not uses_simulation(station) or not isinstance(device, SimBackend):
         return None
     need_extra("sim", "a simulated station")
     from ghest_rt.cli.sim_world import LiveWorld  # noqa: PLC0415  (needs the extra `sim`)

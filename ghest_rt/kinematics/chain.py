@@ -34,7 +34,9 @@ class Drives:
         self._settings_m = dict(settings_m)
         self._measured = {name: index for index, name in enumerate(measured_joints)}
         if len(self._measured) < len(measured_joints):
-            raise BadInputError(f"encoders.joints names a joint twice: {', '.join(measured_joints)}; remove one")
+            raise BadInputError(
+                f"encoders.joints names a joint twice: {', '.join(measured_joints)}; remove one ({urdf.source})"
+            )
         for name in measured_joints:
             joint = _known(urdf, name, "encoders.joints")
             if joint.kind not in (JointKind.REVOLUTE, JointKind.CONTINUOUS, JointKind.PRISMATIC):
@@ -104,7 +106,7 @@ def _check_setting(joint: Joint, value_m: float, *, measured: bool) -> None:
     if joint.kind is not JointKind.PRISMATIC:
         raise BadInputError(f"{key}: {joint.where} is {joint.kind}; only prismatic joints are set, remove it")
     if measured:
-        raise BadInputError(f"{key}: the joint is also in encoders.joints; remove one")
+        raise BadInputError(f"{key}: {joint.where} is also in encoders.joints; remove one")
     if joint.mimic is not None:
         raise BadInputError(f'{key}: {joint.where} mimics "{joint.mimic.joint}"; set that one')
     if not joint.lower <= value_m <= joint.upper:

@@ -10,21 +10,27 @@ from ghest_drivers.interfaces import EncoderLink, RgbdCamera
 from ghest_rt.config.camera_devices import RealsenseBagBackend
 from ghest_rt.config.devices import SimBackend
 from ghest_rt.config.load import LoadedStation
-from ghest_rt.config.station import Camera, StationConfig
+from ghest_rt.config.station import Camera
 from ghest_rt.errors import BadInputError, DeviceError
 from ghest_rt.service.encoder_device import make_encoder_link
 
 
-def uses_simulation(config: StationConfig) -> bool:
+def uses_simulation(station: LoadedStation) -> bool:
     """Return whether the station's devices are simulated.
 
     Raises:
         BadInputError: Some are and some are not.
     """
-    devices = (config.encoders.device, *(camera.device for camera in config.cameras.values()))
-    simulated = [isinstance(device, SimBackend) for device in devices]
+    config = station.config
+    cameras = {f"cameras.{name}": camera.device for name, camera in config.cameras.items()}
+    devices = {**cameras, "encoders": config.encoders.device}
+    simulated = [isinstance(device, SimBackend) for device in devices.values()]
     if any(simulated) and not all(simulated):
-        raise BadInputError('either all devices of a station are simulated (backend = "sim") or none; correct the backends')
+        backends = ", ".join(f"{key} is {device.backend}" for key, device in devices.items())
+        raise BadInputError(
+            f'{station.source}: either all devices of a station are simulated (backend = "sim") or none, and {backends}; '
+            "correct the backends"
+        )
     return all(simulated)
 
 

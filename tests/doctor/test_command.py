@@ -52,6 +52,19 @@ def test_a_bad_station_file_ends_with_2_and_the_rest_is_looked_at(tmp_path: Path
     assert any(finding["check"] == "real-time priority" for finding in findings)
 
 
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [('link = "l8"', 'link = "l99"'), ('"j1", "j2"', '"j1"'), ("[elbow]", '[publisher]\nidentity = "x"\n[elbow]')],
+)
+def test_a_station_that_the_service_would_refuse_is_not_ready(tmp_path: Path, station_text: str, old: str, new: str) -> None:
+    station_of(tmp_path, station_text.replace(old, new, 1))
+    done = doctor("--station", str(tmp_path / "station.toml"), "--json")
+    assert done.returncode == 2
+    finding = next(one for one in json.loads(done.stdout)["findings"] if one["check"] == "station file's parts")
+    assert finding["exit_code"] == 2
+    assert str(tmp_path / "station.toml") in finding["detail"]
+
+
 def test_live_needs_a_station() -> None:
     done = doctor("--live", "1")
     assert done.returncode == 2

@@ -1,6 +1,7 @@
 """Whether the devices that a station names are connected and can be used."""
 
 import json
+import os
 import re
 from pathlib import Path
 from typing import Any
@@ -26,11 +27,23 @@ def test_without_a_station_nothing_connected_is_not_ready() -> None:
 
 
 def test_devices_of_the_station_are_recognised_by_serial_number(tmp_path: Path, station_text: str) -> None:
-    station = station_of(tmp_path, station_text.replace("000000000001", "123").replace("/dev/ttyNoSuchPort", "/dev/null"))
+    master, slave = os.openpty()
+    text = station_text.replace("000000000001", "123").replace("/dev/ttyNoSuchPort", os.ttyname(slave))
     present = Present({"realsense": ProbeResult((SR300,)), "oak": ProbeResult(())}, [], [], [])
-    findings = list(check_station_devices(station, present))
+    findings = list(check_station_devices(station_of(tmp_path, text), present))
+    os.close(slave)
+    os.close(master)
     assert _states(findings) == {"camera r0": State.MISSING, "camera r1": State.OK, "encoders": State.OK}
     assert "connected: 123" in findings[0].remedy
+
+
+@pytest.mark.parametrize("port", ["/dev/null", "/dev", __file__])
+def test_what_is_no_serial_port_is_told(tmp_path: Path, station_text: str, port: str) -> None:
+    station = station_of(tmp_path, station_text.replace("/dev/ttyNoSuchPort", port))
+    finding = list(check_station_devices(station, NOTHING))[-1]
+    assert (finding.state, finding.exit_code) == (State.MISSING, 3)
+    assert f"{port} is not a serial port" in finding.detail
+    assert "encoders.device.port" in finding.remedy
 
 
 @pytest.mark.parametrize(

@@ -164,9 +164,28 @@ def test_growing_pauses_where_systemd_knows_them(tmp_path: Path) -> None:
     assert f"write {tmp_path}/etc/systemd/system/ghest-rt.service.d/10-backoff.conf" in steps
 
 
-def plan(target: Target, systemd_version: int) -> list[str]:
+def test_cpus_that_the_machine_lacks_are_refused_but_in_an_image(tmp_path: Path) -> None:
+    for cpus in ("0", "0-0,0"):
+        assert plan(Target(Path("/"), None), 252, cpus)
+    for cpus in ("4000", "0-4000", "0,4000", "3-2"):
+        with pytest.raises(BadInputError, match=f"--cpus '?{cpus}"):
+            plan(Target(Path("/"), None), 252, cpus)
+    assert plan(Target(tmp_path, None), 252, "4000")
+
+
+def test_a_station_that_the_service_would_refuse_is_not_installed(install: Install, root: Path, tmp_path: Path) -> None:
+    other = other_station(tmp_path / "other")
+    other.write_text(other.read_text().replace('link = "l8"', 'link = "l99"', 1))
+    for arguments in ([], ["--dry-run"]):
+        done = install("--station", other, *arguments)
+        assert done.returncode == 2
+        assert "cameras.r1.link = 'l99'" in done.stderr
+    assert files_in(root) == set()
+
+
+def plan(target: Target, systemd_version: int, cpus: str | None = None) -> list[str]:
     made = plan_install(
-        target, shipped=UNITS, executable=Path("/bin/sh"), station=STATION, cpus=None, systemd_version=systemd_version
+        target, shipped=UNITS, executable=Path("/bin/sh"), station=STATION, cpus=cpus, systemd_version=systemd_version
     )
     return shown(made.steps)
 

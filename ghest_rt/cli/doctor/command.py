@@ -24,6 +24,7 @@ from ghest_rt.config.load import LoadedStation, load_station
 from ghest_rt.config.station import Publisher
 from ghest_rt.errors import BadInputError, GhestError
 from ghest_rt.service.devices import make_devices
+from ghest_rt.service.station_check import check_station
 
 _STYLES = {State.OK: "green", State.NOTE: "yellow", State.MISSING: "bold red"}
 
@@ -84,7 +85,13 @@ def _load(path: Path | None) -> tuple[LoadedStation | None, list[Finding]]:
         station = load_station(path)
     except BadInputError as error:
         return None, [missing("station file", str(error), "correct it; the files in config/ are examples", exit_code=2)]
-    return station, [ok("station file", f"{path}: station {station.config.station.id}, {station.config.station.arm} arm")]
+    found = ok("station file", f"{path}: station {station.config.station.id}, {station.config.station.arm} arm")
+    try:
+        check_station(station)
+    except GhestError as error:
+        remedy = "correct it; the service would end with this message"
+        return station, [found, missing("station file's parts", str(error), remedy, error.exit_code)]
+    return station, [found, ok("station file's parts", "geometry, encoders, keys: they fit each other")]
 
 
 def _backends(station: LoadedStation | None) -> set[str]:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from ghest_drivers.hardware.probe import ProbeResult
 from ghest_rt.cli.doctor.findings import Finding, missing, note, ok
-from ghest_rt.cli.doctor.links import CanInterface, SerialPort, may_open
+from ghest_rt.cli.doctor.links import CanInterface, SerialPort, is_serial, may_open
 from ghest_rt.cli.doctor.usb import UsbCamera
 from ghest_rt.config.camera_devices import OakBackend, RealsenseBackend, RealsenseBagBackend
 from ghest_rt.config.encoder_devices import (
@@ -141,6 +141,10 @@ def _port(check: str, port: str, present: Present) -> Finding:
         others = ", ".join(found.path for found in present.ports) or "none"
         remedy = f"connect the encoder box, or correct encoders.device.port; ports found: {others}"
         return missing(check, f"there is no port {port}", remedy, exit_code=3)
+    if not is_serial(Path(port)):
+        others = ", ".join(found.path for found in present.ports) or "none"
+        remedy = f"correct encoders.device.port; ports found: {others}"
+        return missing(check, f"{port} is not a serial port", remedy, exit_code=3)
     if not may_open(Path(port)):
         return missing(check, f"{port} may not be opened by this user", _GROUP, exit_code=3)
     return ok(check, f"{port} is there")

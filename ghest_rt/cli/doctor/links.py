@@ -1,6 +1,7 @@
 """Serial ports and CAN interfaces."""
 
 import os
+import stat
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -46,6 +47,18 @@ def serial_ports(dev: Path = Path("/dev")) -> Iterator[SerialPort]:
 def may_open(path: Path) -> bool:
     """Return whether this user may read and write a device file."""
     return os.access(path, os.R_OK | os.W_OK)
+
+
+def is_serial(path: Path, sys_char: Path = Path("/sys/dev/char")) -> bool:
+    """Return whether a device file may be a serial port; told without opening it, which would reset some boxes.
+
+    Where the kernel does not say of what kind a character device is (pseudo-terminals), it may be one.
+    """
+    facts = path.stat()
+    if not stat.S_ISCHR(facts.st_mode):
+        return False
+    subsystem = sys_char / f"{os.major(facts.st_rdev)}:{os.minor(facts.st_rdev)}" / "subsystem"
+    return not subsystem.exists() or subsystem.resolve().name == "tty"
 
 
 def can_interfaces(root: Path = Path("/sys/class/net")) -> Iterator[CanInterface]:

@@ -4,16 +4,17 @@ import re
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 
+from ghest_rt.cli.install_service.cpus import check_cpus
 from ghest_rt.cli.install_service.gateway import GATEWAY_UNIT, IDENTITY_DIR, KEY_PATH, gateway_unit, identity_files
 from ghest_rt.cli.install_service.record import RECORD, Installed, InstalledService, read_record, sha256
 from ghest_rt.cli.install_service.station_files import STATION_FILE, clash, leaves_machine, station_files
 from ghest_rt.cli.install_service.steps import RemoveFile, RunCommand, Step, WriteFile
 from ghest_rt.config.load import load_station
 from ghest_rt.errors import BadInputError
+from ghest_rt.service.station_check import check_station
 
 _SYSTEM = "etc/systemd/system"
 _NAME = re.compile(r"^[A-Za-z0-9_-]{1,64}$")
-_CPUS = re.compile(r"^\d+(-\d+)?(,\d+(-\d+)?)*$")
 _EXECUTABLE = re.compile(r"^/[A-Za-z0-9._/+-]+$")
 _SHIPPED_EXECUTABLE = "/opt/ghest-rt/bin/ghest-rt"
 _HIDDEN = tuple(map(PurePosixPath, ("/home", "/root", "/run/user", "/tmp", "/var/tmp")))  # noqa: S108  (not used, refused)
@@ -108,12 +109,14 @@ def plan_install(
     before = installed.services.get(target.unit)
     station_path = f"{target.config_dir}/{STATION_FILE}"
     if station is not None:
-        config, contents = station_files(station)
+        config, contents = station_files(station, here=target.live)
         clash(config, [(unit, path) for unit, path in others if path.exists()])
         files.update({f"{target.config_dir}/{name}": data for name, data in contents.items()})
         kept: dict[str, str] = {}
     elif before is not None and (target.root / station_path).exists():
-        config = load_station(target.root / station_path).config
+        kept_station = load_station(target.root / station_path)
+        check_station(kept_station, here=target.live)
+        config = kept_station.config
         kept = {path: digest for path, digest in before.files.items() if path.startswith(f"{target.config_dir}/")}
     else:
         raise BadInputError(f"no station file is installed for {target.unit}: name one with --station FILE")
@@ -190,8 +193,7 @@ def _system_files(target: Target, shipped: Path, executable: Path, cpus: str | N
     if systemd_version >= _BACKOFF_SINCE:
         files[f"{drop_ins}/10-backoff.conf"] = (shipped / "ghest-rt-backoff.conf").read_bytes()
     if cpus is not None:
-        if not _CPUS.match(cpus):
-            raise BadInputError(f"--cpus {cpus!r}: write CPUs as 2-3 or 2,3")
+        check_cpus(cpus, must_exist=target.live)
         files[f"{drop_ins}/20-cpus.conf"] = f"# The service's threads run here only.\n[Service]\nCPUAffinity={cpus}\n".encode()
     return files
 

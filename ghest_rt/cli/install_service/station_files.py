@@ -6,15 +6,21 @@ from pathlib import Path, PurePosixPath
 from ghest_rt.config.load import load_station
 from ghest_rt.config.station import StationConfig
 from ghest_rt.errors import BadInputError
+from ghest_rt.service.station_check import check_station
 
 STATION_FILE = "station.toml"
 
 
-def station_files(path: Path) -> tuple[StationConfig, dict[str, bytes]]:
+def station_files(path: Path, *, here: bool) -> tuple[StationConfig, dict[str, bytes]]:
     """Return a station with the files it consists of, by path relative to its folder.
+
+    Args:
+        path: The station file.
+        here: Whether it will run on this machine.
 
     Raises:
         BadInputError: The station file is invalid, is one of a replay, or names files that cannot be taken along.
+        GhestError: The service would refuse it (`check_station`).
     """
     station = load_station(path)
     config = station.config
@@ -41,6 +47,7 @@ def station_files(path: Path) -> tuple[StationConfig, dict[str, bytes]]:
             files[str(relative)] = (path.parent / relative).read_bytes()
         except OSError as error:
             raise BadInputError(f"{path}: {key}: cannot read {path.parent / relative}: {error.strerror or error}") from error
+    check_station(station, here=here)
     return config, files
 
 
