@@ -18,12 +18,13 @@ class Method(StrEnum):
 
 
 class Movement(StrEnum):
-    """The paper's movements, Table 2."""
+    """The paper's movements, Table 2, and that of a calibration session (docs/calibration.md)."""
 
     SABAD = "SAbAd"
     SFE = "SFE"
     SIR = "SIR"
     COMB = "COMB"
+    CAL = "CAL"
 
 
 class Sensor(StrEnum):
@@ -55,7 +56,7 @@ class SoftTissue(StrEnum):
     SEVERE = "severe"
 
 
-MOVEMENTS = "|".join(Movement)
+MOVEMENTS = "|".join(movement for movement in Movement if movement is not Movement.CAL)
 
 RecordingFile = Annotated[Path, typer.Argument(metavar="RECORDING", help="Recording (.mcap)", show_default=False)]
 StationFile = Annotated[Path, typer.Option(metavar="FILE", help="Station file", show_default=False)]

@@ -7,6 +7,8 @@ from ghest_rt.config.shipped import shipped_config_dir
 from ghest_rt.errors import BadInputError
 from ghest_rt.simulation.anatomy import anatomy
 from ghest_rt.simulation.calibrating import with_reference
+from ghest_rt.simulation.calibration_motion import NAME as CALIBRATION
+from ghest_rt.simulation.calibration_motion import CalibrationMotion
 from ghest_rt.simulation.fitting import fit_station, without_depth
 from ghest_rt.simulation.imaging import Light
 from ghest_rt.simulation.knee import DURATION_S, JOINT, KneeMotion, KneeStage
@@ -108,7 +110,7 @@ def _station(options: SimulateOptions) -> LoadedStation:
 
 
 def motion_of(movement: str | None, file: Path | None, seed: int) -> Motion:
-    """Return a movement of Table 2, or that of an OpenSim motion file.
+    """Return a movement of Table 2, that of a calibration session (CAL), or that of an OpenSim motion file.
 
     Args:
         movement: Its name, or None with `file`.
@@ -119,6 +121,8 @@ def motion_of(movement: str | None, file: Path | None, seed: int) -> Motion:
         BadInputError: Both are given or none, the movement is unknown, or the file cannot be used.
     """
     if movement is not None and file is None:
+        if movement.upper() == CALIBRATION:
+            return CalibrationMotion(seed)
         return TherapyMotion(find_movement(movement), seed)
     if file is not None and movement is None:
         return OpenSimMotion(read_motion_table(file), file.stem)

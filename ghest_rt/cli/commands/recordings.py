@@ -31,7 +31,10 @@ def simulate(
     movement: Annotated[
         Movement | None,
         typer.Option(
-            help="One of the paper's movements (Table 2)", show_default=False, case_sensitive=False, metavar=MOVEMENTS
+            help="One of the paper's movements (Table 2), or CAL: a calibration session",
+            show_default=False,
+            case_sensitive=False,
+            metavar=f"{MOVEMENTS}|CAL",
         ),
     ] = None,
     motion: Annotated[
