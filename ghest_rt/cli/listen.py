@@ -3,8 +3,10 @@
 import signal
 import sys
 import threading
+import time
 from pathlib import Path
 
+from ghest_rt.cli.station_watch import StationWatch
 from ghest_rt.client import (
     ConnectionChanged,
     EventReport,
@@ -23,6 +25,7 @@ from ghest_rt.messages.results import Reason
 
 _POLL_S = 0.2
 _HINT_AFTER_S = 3.0
+_TOKENS_COME_WITHIN_S = 1.0
 _CAUSES = {
     LinkCause.SILENT: "nothing comes, though the connection stands",
     LinkCause.DELAYED: "what comes was published long ago",
@@ -40,7 +43,7 @@ def listen_to(endpoint: str, station: str, identity: Path | None, count: int | N
     stop = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda number, frame: stop.set())
-    received, lost, quiet_s = 0, 0, 0.0
+    received, lost, quiet_s, connected = 0, 0, 0.0, False
     with GhestClient(endpoint, stations=station, identity=identity) as client, client.updates() as updates:
         while not stop.is_set() and (count is None or received < count):
             update = updates.get(_POLL_S)
@@ -52,14 +55,36 @@ def listen_to(endpoint: str, station: str, identity: Path | None, count: int | N
                 continue
             if isinstance(update, Gap):
                 lost += update.count
+            elif isinstance(update, ConnectionChanged):
+                connected = update.connected
             told = None if update is None else note_of(update)
             if told is not None:
                 sys.stderr.write(told + "\n")
             if update is None:
                 quiet_s += _POLL_S
                 if _HINT_AFTER_S <= quiet_s < _HINT_AFTER_S + _POLL_S:
-                    sys.stderr.write(f"nothing arrives from {endpoint}; is a ghest-rt running there?\n")
+                    sys.stderr.write(
+                        (why_nothing_comes(endpoint, station, identity) if connected else _nobody(endpoint)) + "\n"
+                    )
     sys.stderr.write(f"{received} samples received, {lost} lost\n")
+
+
+def why_nothing_comes(endpoint: str, station: str, identity: Path | None) -> str:
+    """Look for stations behind an endpoint that answers, and return what to tell somebody to whom nothing comes from there."""
+    with StationWatch((endpoint,), "*", identity, time.monotonic) as known:
+        deadline_s = time.monotonic() + _TOKENS_COME_WITHIN_S
+        while time.monotonic() < deadline_s and station not in known.stations():
+            time.sleep(_POLL_S / 4)
+        alive = [name for name, state in known.stations().items() if state.alive]
+    if station in alive or (alive and station == "*"):
+        return f"{', '.join(alive) if station == '*' else station}: alive, but no sample comes; ghest-rt status says more"
+    if alive:
+        return f"no station {station} at {endpoint}; alive: {', '.join(alive)}"
+    return f"connected to {endpoint}, but no station is alive there"
+
+
+def _nobody(endpoint: str) -> str:
+    return f"nothing arrives from {endpoint}; is a ghest-rt running there?"
 
 
 def note_of(update: Update) -> str | None:

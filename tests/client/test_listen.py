@@ -35,6 +35,17 @@ def test_it_prints_samples_as_json_lines_and_says_what_happened_beside_them(tmp_
     assert "150 samples received, 0 lost" in stderr
 
 
+def test_a_station_that_is_not_there_is_told_with_those_that_are() -> None:
+    with FakeStation("one") as one:
+        command = [*LISTEN, "--connect", one.endpoint, "--station", "nosuch"]
+        with subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True) as listening:
+            assert listening.stderr is not None
+            told = next(line for line in listening.stderr if "alive" in line or "is a ghest-rt running" in line)
+            listening.terminate()
+            listening.communicate(timeout=10)
+    assert told == f"no station nosuch at {one.endpoint}; alive: one\n"
+
+
 def test_an_identity_that_is_none_is_bad_input(tmp_path: Path) -> None:
     done = subprocess.run(
         [*LISTEN, "--connect", "tls/127.0.0.1:7447", "--identity", str(tmp_path)], capture_output=True, text=True, check=False
