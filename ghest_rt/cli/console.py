@@ -4,11 +4,13 @@ import json
 import logging
 import os
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 
 import numpy as np
 
 from ghest_rt.cli.journal import journal_handler
+from ghest_rt.errors import GhestError
 
 
 class _StderrHandler(logging.Handler):
@@ -38,9 +40,32 @@ def unused_in_words(unused: Mapping[str, int]) -> str:
     return "samples not used: " + ", ".join(f"{reason} x{unused[reason]}" for reason in sorted(unused)) if unused else ""
 
 
+@contextmanager
+def printing() -> Iterator[None]:
+    """Print what is printed within, to the last byte.
+
+    Raises:
+        GhestError: Standard output takes no more, such as a file on a full disk. A reader that has gone is left to Typer.
+    """
+    try:
+        yield
+        sys.stdout.flush()
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        # What is buffered would be tried again at the end of the process, and its failure told once more.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        raise GhestError(f"standard output: cannot be written to: {error.strerror or error}") from error
+
+
 def print_json(document: object) -> None:
-    """Print one JSON document on standard output; what is not finite becomes null."""
-    sys.stdout.write(json.dumps(_plain(document), indent=2, allow_nan=False) + "\n")
+    """Print one JSON document on standard output; what is not finite becomes null.
+
+    Raises:
+        GhestError: Standard output cannot be written to.
+    """
+    with printing():
+        sys.stdout.write(json.dumps(_plain(document), indent=2, allow_nan=False) + "\n")
 
 
 def _plain(value: object) -> object:

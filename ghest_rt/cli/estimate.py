@@ -7,7 +7,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.progress import Progress
 
-from ghest_rt.cli.console import print_json, unused_in_words
+from ghest_rt.cli.console import print_json, printing, unused_in_words
 from ghest_rt.cli.options import Method
 from ghest_rt.cli.table_file import Row, row_of, write_table, writer_for
 from ghest_rt.config.load import load_station
@@ -63,6 +63,7 @@ def estimate(path: Path, method: Method | None, out: Path, station_file: Path | 
         )
     else:
         shares = ", ".join(f"{100 * share:.2f} % {status}" for status, share in fractions.items())
-        Console().print(f"{out}: {len(rows)} samples, {shares}, method {pipeline.method}")
-        if unused:
-            Console().print(unused_in_words(unused))
+        with printing():
+            Console().print(f"{out}: {len(rows)} samples, {shares}, method {pipeline.method}")
+            if unused:
+                Console().print(unused_in_words(unused))

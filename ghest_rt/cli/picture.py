@@ -5,6 +5,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.progress import Progress
 
+from ghest_rt.cli.console import printing
 from ghest_rt.cli.options import Method
 from ghest_rt.studies.picture import draw_recording
 
@@ -25,4 +26,5 @@ def draw(recording: Path, out: Path, method: Method | None) -> None:
             None if method is None else method.value,
             progress=lambda share: progress.update(task, completed=share),
         )
-    Console().print(f"{out}: picture of {recording.name}")
+    with printing():
+        Console().print(f"{out}: picture of {recording.name}")

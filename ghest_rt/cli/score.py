@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.progress import Progress, TaskID
 from rich.table import Table
 
-from ghest_rt.cli.console import print_json, unused_in_words
+from ghest_rt.cli.console import print_json, printing, unused_in_words
 from ghest_rt.cli.options import Method
 from ghest_rt.errors import BadInputError
 from ghest_rt.studies.score import RecordingScore, score_recording
@@ -35,7 +35,8 @@ def score_paths(paths: Sequence[Path], method: Method | None, as_json: bool) -> 
     if as_json:
         print_json({"recordings": [asdict(score) for score in scores], "mean": _mean(scores)})
     else:
-        _print_table(scores)
+        with printing():
+            _print_table(scores)
 
 
 def _show(progress: Progress, task: TaskID, share: float) -> None:

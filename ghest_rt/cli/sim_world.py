@@ -1,10 +1,14 @@
 """The simulated clinic as the devices of a live run, with its truth. Needs the extra `sim` as soon as it is imported."""
 
+from dataclasses import replace
+
 from ghest_rt.cli.scoreboard import Scoreboard
+from ghest_rt.cli.simulated_station import checked_station
 from ghest_rt.config.load import LoadedStation
 from ghest_rt.messages.published import Event, GhAngles, Health
 from ghest_rt.messages.results import GhEstimate
 from ghest_rt.simulation.building import stage_world
+from ghest_rt.simulation.knee import JOINT as KNEE
 from ghest_rt.simulation.options import SimulateOptions
 from ghest_rt.simulation.staged import StagedWorld
 
@@ -20,9 +24,11 @@ class LiveWorld:
             start_ns: The service clock's time at the beginning of the movement.
 
         Raises:
-            BadInputError: An option cannot be used.
+            BadInputError: An option or the station file cannot be used.
             GhestError: The exoskeleton cannot follow the movement.
         """
+        if options.station is not None and checked_station(options.station).config.joint.name == KNEE:
+            options = replace(options, movement=None)  # a knee has one of its own
         self._world: StagedWorld = stage_world(options)
         self._start_ns = start_ns
         self.scoreboard = Scoreboard()

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -73,6 +74,14 @@ class RecordingWriter:
         self._schemas: dict[str, int] = {}
         self._channels: dict[str, int] = {}
         self._cameras: dict[str, _CameraChannels] = {}
+        try:
+            self._begin(station, facts)
+        except OSError as error:
+            with suppress(OSError):  # what could not be written is tried again
+                self._file.close()
+            raise self._failed(error) from error
+
+    def _begin(self, station: LoadedStation, facts: Mapping[str, str]) -> None:
         self._writer.start(profile=layout.PROFILE, library="ghest-rt")
         self._writer.add_metadata(layout.FACTS, {"format": layout.FORMAT_VERSION, **facts})
         for name, media_type, text in (

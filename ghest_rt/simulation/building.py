@@ -1,5 +1,6 @@
 """The simulated clinic, or the knee, set up as options describe it."""
 
+import math
 from pathlib import Path
 
 from ghest_rt.config.load import LoadedStation, load_station
@@ -14,7 +15,7 @@ from ghest_rt.simulation.imaging import Light
 from ghest_rt.simulation.knee import DURATION_S, JOINT, KneeMotion, KneeStage
 from ghest_rt.simulation.opensim_file import read_motion_table
 from ghest_rt.simulation.opensim_motion import OpenSimMotion
-from ghest_rt.simulation.options import SimulateOptions
+from ghest_rt.simulation.options import HEIGHT_M, SimulateOptions
 from ghest_rt.simulation.posture import Motion
 from ghest_rt.simulation.sensors import find_sensors
 from ghest_rt.simulation.soft_tissue import find_soft_tissue
@@ -31,6 +32,9 @@ _STATIONS = {
 }
 
 
+_GREATEST_SEED = (1 << 63) - 1
+
+
 def stage_world(options: SimulateOptions) -> StagedWorld:
     """Set up what `options` describe (`out` and `faults` are not used): the clinic, or the knee if the station measures one.
 
@@ -41,6 +45,7 @@ def stage_world(options: SimulateOptions) -> StagedWorld:
     if options.station is not None:
         station = load_station(options.station)
         if station.config.joint.name == JOINT:
+            _check_numbers(options)
             return _knee_world(options, station)
     return build_world(options)
 
@@ -52,10 +57,7 @@ def build_world(options: SimulateOptions) -> World:
         BadInputError: An option, the station file or the motion file cannot be used.
         GhestError: The exoskeleton cannot follow the movement.
     """
-    if not 0 <= options.seed < 1 << 63:
-        raise BadInputError(f"seed {options.seed}: give a number that is not negative")
-    if min(options.brightness, *options.white_balance) <= 0:
-        raise BadInputError("brightness and white balance are factors: give positive numbers")
+    _check_numbers(options)
     sensors = find_sensors(options.sensor)
     body = anatomy(options.height_m)
     station = fit_station(_station(options), body)
@@ -84,10 +86,32 @@ def build_world(options: SimulateOptions) -> World:
     )
 
 
+def _check_numbers(options: SimulateOptions) -> None:
+    if not 0 <= options.seed <= _GREATEST_SEED:
+        raise BadInputError(f"--seed {options.seed}: give a whole number from 0 to {_GREATEST_SEED}")
+    if options.duration_s is not None and not 0.0 < options.duration_s < math.inf:
+        raise BadInputError(f"--duration {options.duration_s:g}: give a positive number of seconds")
+    if min(options.brightness, *options.white_balance) <= 0:
+        raise BadInputError("brightness and white balance are factors: give positive numbers")
+
+
 def _knee_world(options: SimulateOptions, station: LoadedStation) -> StagedWorld:
     """Set up the example of another limb, config/examples/knee."""
-    if options.marker_moves or options.soft_tissue != "none" or options.motion is not None:
-        raise BadInputError("the simulated knee has one movement, no marker shifts and no soft tissue; leave these options out")
+    given = {
+        f"--movement {options.movement}": options.movement is not None,
+        f"--motion {options.motion}": options.motion is not None,
+        f"--arm {options.arm}": options.arm != "right",
+        f"--height {options.height_m:g}": options.height_m != HEIGHT_M,
+        "--marker-shift or --marker-turn": bool(options.marker_moves),
+        f"--soft-tissue {options.soft_tissue}": options.soft_tissue != "none",
+        "--calibration-reference": options.calibration_reference,
+    }
+    without_effect = [option for option, there in given.items() if there]
+    if without_effect:
+        raise BadInputError(
+            f"{', '.join(without_effect)}: no use with {station.source}: the simulated knee is one person's right one, has one "
+            "movement, no marker shifts and no soft tissue; leave this out"
+        )
     if options.color_only:
         station = without_depth(station)
     return StagedWorld(

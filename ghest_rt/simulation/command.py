@@ -9,10 +9,11 @@ from importlib.metadata import version
 from pathlib import Path
 
 from ghest_drivers.samples import RgbdFrame
+from ghest_rt.errors import BadInputError, GhestError
 from ghest_rt.recording.writer import RecordingWriter
 from ghest_rt.simulation.building import stage_world
 from ghest_rt.simulation.faults import FaultyDevices
-from ghest_rt.simulation.options import SimulateOptions
+from ghest_rt.simulation.options import HEIGHT_M, SimulateOptions
 from ghest_rt.simulation.staged import StagedWorld
 
 _LOOK_AHEAD = 6
@@ -44,12 +45,15 @@ class SimulationSummary:
 def simulate(options: SimulateOptions, progress: Callable[[float], None]) -> SimulationSummary:
     """Record a simulated session. `progress` hears the fraction done, 0-1, now and then.
 
+    The recording appears whole or not at all: what an interruption or an error leaves half-way is removed.
+
     Raises:
         BadInputError: An option, the station file, the motion file or the output path cannot be used.
-        GhestError: The exoskeleton cannot follow the movement.
+        GhestError: The exoskeleton cannot follow the movement, or the disk is full or gone.
     """
+    _check_out(options.out)
     world = stage_world(options)
-    devices = FaultyDevices(options.faults, world.camera_names, options.seed)
+    devices = FaultyDevices(options.faults, world.camera_names, options.seed, world.timeline.duration_s)
     name = world.motion_name
     facts = {
         "created_by": f"ghest-rt {version('ghest-rt')}",
@@ -60,13 +64,54 @@ def simulate(options: SimulateOptions, progress: Callable[[float], None]) -> Sim
         "height_m": str(options.height_m),
         **_disturbances(options),
     }
-    first_ns = min(world.encoder_arrival_ns(0), world.truth_times_ns[0])
     deliveries = {camera: _deliveries(world, devices, camera) for camera in world.camera_names}
+    for camera, given in deliveries.items():
+        if not given:
+            raise BadInputError(f"camera {camera} would deliver no frame at all: drop fewer (--fault), or simulate longer")
+    part = options.out.with_name(options.out.name + ".part")
+    try:
+        with RecordingWriter(part, world.station, facts) as writer:
+            rows = _write(writer, world, devices, deliveries, progress)
+        part.replace(options.out)
+    except GhestError as error:
+        if not isinstance(error.__cause__, OSError):
+            raise
+        cause = error.__cause__.strerror or error.__cause__
+        raise type(error)(f"{options.out}: cannot write the recording: {cause}; nothing is left of it") from error
+    finally:
+        part.unlink(missing_ok=True)
+    progress(1.0)
+    return SimulationSummary(
+        out=options.out,
+        motion=name,
+        duration_s=world.timeline.duration_s,
+        frames={camera: len(given) for camera, given in deliveries.items()},
+        encoder_samples=rows,
+        truth_samples=len(world.truth_times_ns),
+        size_bytes=options.out.stat().st_size,
+    )
+
+
+def _check_out(out: Path) -> None:
+    if out.suffix != ".mcap":
+        raise BadInputError(f"--out {out}: a recording ends in .mcap; name it so")
+    if out.is_dir():
+        raise BadInputError(f"--out {out}: is a folder; name a file")
+    if not out.parent.is_dir():
+        raise BadInputError(f"--out {out}: cannot write the recording: no such folder; make {out.parent} first")
+
+
+def _write(
+    writer: RecordingWriter,
+    world: StagedWorld,
+    devices: FaultyDevices,
+    deliveries: dict[str, list["_Delivery"]],
+    progress: Callable[[float], None],
+) -> int:
+    """Write what the devices deliver, and the truth; return how many encoder rows there are."""
+    first_ns = min(world.encoder_arrival_ns(0), world.truth_times_ns[0])
     events = _events(world, deliveries)
-    with (
-        RecordingWriter(options.out, world.station, facts) as writer,
-        ThreadPoolExecutor(max_workers=len(world.camera_names)) as pool,
-    ):
+    with ThreadPoolExecutor(max_workers=len(world.camera_names)) as pool:
         for camera in world.camera_names:
             writer.add_camera(world.camera_info(camera), first_ns, with_depth=world.station.config.cameras[camera].depth)
         frames = {camera: _render_ahead(world, devices, camera, given, pool) for camera, given in deliveries.items()}
@@ -83,16 +128,7 @@ def simulate(options: SimulateOptions, progress: Callable[[float], None]) -> Sim
             else:
                 writer.write_frame(next(frames[kind]))
                 progress(done / len(events))
-    progress(1.0)
-    return SimulationSummary(
-        out=options.out,
-        motion=name,
-        duration_s=world.timeline.duration_s,
-        frames={camera: len(given) for camera, given in deliveries.items()},
-        encoder_samples=rows,
-        truth_samples=len(world.truth_times_ns),
-        size_bytes=options.out.stat().st_size,
-    )
+    return rows
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,7 +213,7 @@ def _command(options: SimulateOptions, motion_name: str) -> str:
         words += ["--duration", f"{options.duration_s:g}"]
     if options.arm != "right":
         words += ["--arm", options.arm]
-    if options.height_m != 1.75:
+    if options.height_m != HEIGHT_M:
         words += ["--height", f"{options.height_m:g}"]
     if options.marker != "disks":
         words += ["--marker", options.marker]

@@ -15,7 +15,7 @@ from scipy.interpolate import CubicSpline
 from ghest_rt.errors import GhestError
 from ghest_rt.geometry.so3 import Array
 from ghest_rt.simulation.posture import Motion
-from ghest_rt.simulation.scene import Scene, exoskeleton_spec
+from ghest_rt.simulation.scene import Scene, exoskeleton_spec, refusals_told
 
 _RATE_HZ = 100.0
 _PAD_S = 0.15
@@ -27,6 +27,12 @@ _FIRST_ITERATIONS = 200
 _ITERATIONS = 20
 _DT_S = 1.0
 _REFUSAL_M = 0.005
+
+LINKS = frozenset(("l5", "l8"))
+"""The links of the cuffs: any exoskeleton that follows the patient has them."""
+
+JOINTS = frozenset(("j0", "j1", "j8", "j9"))
+"""The joints that the coupling starts from, and those of pro/supination and wrist."""
 
 
 class ExoskeletonMotion:
@@ -81,7 +87,8 @@ class _Follower:
     """Solves the coupling posture by posture, each from the one before."""
 
     def __init__(self, scene: Scene, settings_m: dict[str, float], urdf_text: str, source: str) -> None:
-        model = exoskeleton_spec(urdf_text, source).compile()
+        with refusals_told(source):
+            model = exoskeleton_spec(urdf_text, source).compile()
         self._scene = scene
         self._data = mujoco.MjData(scene.model)
         self._names = tuple(scene.joint_address)

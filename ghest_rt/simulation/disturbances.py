@@ -4,6 +4,7 @@ The estimator is not told: the station file that goes with a recording stays as 
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -69,6 +70,30 @@ def parse_turn(text: str) -> MarkerMove:
         BadInputError: It is not of that form; the text says which part.
     """
     return _parse(text, "turn")
+
+
+def check_moves(moves: Sequence[MarkerMove], duration_s: float) -> None:
+    """Refuse moves that begin after the end, and those that come to more together than one alone may be.
+
+    Raises:
+        BadInputError: There is one; the text says which option.
+    """
+    for move in moves:
+        start_s = move.start_s or 0.0
+        if start_s >= duration_s:
+            raise BadInputError(
+                f"--marker-{move.kind} {move.text}: begins after the end, {duration_s:g} s: give an earlier second or "
+                "simulate longer"
+            )
+        alike = [other for other in moves if (other.marker, other.kind, other.axis) == (move.marker, move.kind, move.axis)]
+        begun = [other for other in alike if (other.start_s or 0.0) <= start_s]
+        limit, unit, scale = (MAX_SHIFT_M, "m", 1.0) if move.kind == "shift" else (MAX_TURN_DEG, "°", 180.0 / math.pi)
+        together = scale * sum(other.amount for other in begun)
+        if abs(together) > limit + 1e-9:
+            raise BadInputError(
+                f"--marker-{move.kind} {', '.join(other.text for other in begun)}: together {together:g} {unit}: "
+                f"stay within {limit:g} {unit}"
+            )
 
 
 def number(option: str, part: str, text: str, limits: tuple[float, float], remedy: str) -> float:

@@ -1,5 +1,6 @@
 """Device faults of a simulated session: what cameras and encoders fail to deliver, and how it is written as an option."""
 
+import math
 from collections.abc import Collection
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -91,17 +92,24 @@ class FaultyDevices:
         faults: The faults.
         cameras: The cameras there are.
         seed: Seeds which frames are hit.
+        duration_s: How long the movement is.
 
     Raises:
-        BadInputError: A fault names a camera that is not there.
+        BadInputError: A fault names a camera that is not there, or begins after the end.
     """
 
-    def __init__(self, faults: tuple[DeviceFault, ...], cameras: Collection[str], seed: int) -> None:
+    def __init__(
+        self, faults: tuple[DeviceFault, ...], cameras: Collection[str], seed: int, duration_s: float = math.inf
+    ) -> None:
         for fault in faults:
             if fault.kind != "encoders-silent" and fault.camera not in cameras:
                 raise BadInputError(
                     f"--fault {fault.text}: camera {fault.camera!r} is not in the station file: "
                     f"give one of {', '.join(cameras)}"
+                )
+            if fault.start_s >= duration_s:
+                raise BadInputError(
+                    f"--fault {fault.text}: begins after the end, {duration_s:g} s: give an earlier second or simulate longer"
                 )
         self._faults = faults
         self._seed = seed

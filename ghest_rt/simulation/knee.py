@@ -15,7 +15,7 @@ from ghest_rt.errors import BadInputError
 from ghest_rt.geometry.se3 import inverse, transform
 from ghest_rt.geometry.so3 import Array, exp_so3, quat_wxyz_from_matrix, rot_x, rot_y, rot_z
 from ghest_rt.messages.results import TruthSample
-from ghest_rt.simulation.scene import add_plate, add_room, arm_from_elw, exoskeleton_spec
+from ghest_rt.simulation.scene import add_plate, add_room, arm_from_elw, exoskeleton_spec, refusals_told
 
 JOINT = "knee"
 DURATION_S = 20.0
@@ -71,13 +71,15 @@ class KneeStage:
         thigh_from_m0 = inverse(self._m0_from_gh)
         shank_from_m1 = _SHANK_FROM_MIDDLE @ arm_from_elw(_SHANK_M) @ inverse(np.array(config.calibration.m1_from_elw))
         spec = exoskeleton_spec(station.urdf_text, station.source)
-        add_room(spec)
-        _add_leg(spec)
+        with refusals_told(station.source):
+            add_room(spec)
+            _add_leg(spec)
         self._markers: dict[str, tuple[int, Array]] = {}
         for marker, body, pose in (("m0", "thigh", thigh_from_m0), ("m1", "shank", shank_from_m1)):
             depth = np.array([0.0, 0.0, pose[2, 3]])  # the stalk ends on the bone's axis
             add_plate(spec.body(body), marker, pose, config.markers[marker].plate_m, depth)
-        self._model = spec.compile()
+        with refusals_told(station.source):
+            self._model = spec.compile()
         for marker, body, pose in (("m0", "thigh", thigh_from_m0), ("m1", "shank", shank_from_m1)):
             self._markers[marker] = (self._model.body(body).id, pose)
         self._cameras = {

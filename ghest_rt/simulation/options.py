@@ -9,6 +9,9 @@ from ghest_rt.simulation.faults import DeviceFault
 from ghest_rt.simulation.optics import Imaging
 from ghest_rt.simulation.texture import MarkerTexture
 
+HEIGHT_M = 1.75
+"""The patient's height unless said otherwise."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SimulateOptions:
@@ -42,7 +45,7 @@ class SimulateOptions:
     seed: int = 0
     duration_s: float | None = None
     arm: Literal["right", "left"] = "right"
-    height_m: float = 1.75
+    height_m: float = HEIGHT_M
     marker: MarkerTexture = "disks"
     brightness: float = 1.0
     white_balance: tuple[float, float, float] = (1.0, 1.0, 1.0)

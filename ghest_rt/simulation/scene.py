@@ -1,5 +1,7 @@
 """The MuJoCo model of the clinic: exoskeleton (from its URDF), patient, marker plates, room. World frame = E."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -27,6 +29,20 @@ _WHITE = (0.93, 0.93, 0.92)
 _URDF_OPTIONS = '<mujoco><compiler fusestatic="false" discardvisual="false" boundmass="0.001" boundinertia="1e-6"/></mujoco>'
 
 
+@contextmanager
+def refusals_told(source: str) -> Iterator[None]:
+    """Tell what MuJoCo refuses within, of the URDF or of what is added to it.
+
+    Raises:
+        BadInputError: It cannot be simulated.
+    """
+    try:
+        yield
+    except ValueError as error:
+        told = " ".join(str(error).split())
+        raise BadInputError(f"{source}: the exoskeleton's URDF cannot be simulated: {told}; correct that element") from error
+
+
 def exoskeleton_spec(urdf_text: str, source: str) -> mujoco.MjSpec:
     """Return the exoskeleton as a MuJoCo specification whose world is the URDF's root link.
 
@@ -35,10 +51,8 @@ def exoskeleton_spec(urdf_text: str, source: str) -> mujoco.MjSpec:
     """
     head, tag, rest = urdf_text.partition("<robot")
     name, end, body = rest.partition(">")
-    try:
+    with refusals_told(source):
         return mujoco.MjSpec.from_string(f"{head}{tag}{name}{end}{_URDF_OPTIONS}{body}")
-    except ValueError as error:
-        raise BadInputError(f"{source}: the exoskeleton's URDF cannot be simulated: {error}; correct that element") from error
 
 
 def arm_from_elw(upper_arm_m: float) -> Array:
@@ -54,6 +68,7 @@ class Scene:
         model: The MuJoCo model.
         side: Which arm.
         anatomy: The patient's dimensions.
+        links: The exoskeleton's links.
         joint_address: Position of each exoskeleton joint in qpos, by name.
         scapula_from_m0: (4, 4) marker plate on the scapula body (origin: GH centre).
         humerus_from_m1: (4, 4) marker plate on the humerus body (origin: GH centre).
@@ -64,6 +79,7 @@ class Scene:
     model: mujoco.MjModel
     side: Side
     anatomy: Anatomy
+    links: frozenset[str]
     joint_address: dict[str, int]
     scapula_from_m0: Array
     humerus_from_m1: Array
@@ -115,16 +131,19 @@ def build_scene(station: StationConfig, urdf_text: str, source: str, body: Anato
     )
     spec = exoskeleton_spec(urdf_text, source)
     exoskeleton_joints = [joint.name for joint in spec.joints]
-    add_room(spec)
-    builder = _PatientBuilder(spec, body, side)
-    builder.add()
-    for marker, bone, bone_from_marker in (("m0", "scapula", scapula_from_m0), ("m1", "humerus", humerus_from_m1)):
-        builder.add_plate(bone, marker, bone_from_marker, station.markers[marker].plate_m, movable=movable_plates)
-    model = spec.compile()
+    links = frozenset(body.name for body in spec.bodies) - {spec.worldbody.name}
+    with refusals_told(source):
+        add_room(spec)
+        builder = _PatientBuilder(spec, body, side)
+        builder.add()
+        for marker, bone, bone_from_marker in (("m0", "scapula", scapula_from_m0), ("m1", "humerus", humerus_from_m1)):
+            builder.add_plate(bone, marker, bone_from_marker, station.markers[marker].plate_m, movable=movable_plates)
+        model = spec.compile()
     return Scene(
         model=model,
         side=side,
         anatomy=body,
+        links=links,
         joint_address={name: int(model.joint(name).qposadr[0]) for name in exoskeleton_joints},
         scapula_from_m0=scapula_from_m0,
         humerus_from_m1=humerus_from_m1,

@@ -5,12 +5,12 @@ from ghest_rt.errors import BadInputError
 from ghest_rt.simulation.anatomy import Anatomy
 from ghest_rt.simulation.attachment import Attachment
 from ghest_rt.simulation.clinic import Clinic
-from ghest_rt.simulation.coupling import ExoskeletonMotion
-from ghest_rt.simulation.disturbances import MarkerMove
+from ghest_rt.simulation.coupling import JOINTS, LINKS, ExoskeletonMotion
+from ghest_rt.simulation.disturbances import MarkerMove, check_moves
 from ghest_rt.simulation.imaging import Light
 from ghest_rt.simulation.optics import Imaging
 from ghest_rt.simulation.posture import Motion
-from ghest_rt.simulation.scene import build_scene
+from ghest_rt.simulation.scene import Scene, build_scene
 from ghest_rt.simulation.sensors import SensorSet
 from ghest_rt.simulation.soft_tissue import SoftTissue
 from ghest_rt.simulation.staged import StagedWorld
@@ -35,7 +35,8 @@ class World(StagedWorld):
         imaging: What goes wrong with the colour images; None for nothing.
 
     Raises:
-        BadInputError: The duration is not positive, or the station's URDF or encoder joints cannot be simulated.
+        BadInputError: The station's URDF, cameras' links or encoder joints cannot be simulated, or a marker moves too far or
+            not before the end.
         GhestError: The exoskeleton cannot follow this movement.
     """
 
@@ -54,18 +55,13 @@ class World(StagedWorld):
         soft_tissue: SoftTissue | None = None,
         imaging: Imaging | None = None,
     ) -> None:
-        if duration_s is not None and not duration_s > 0:
-            raise BadInputError(f"duration {duration_s} s: give a positive number of seconds")
         config = station.config
         settings = config.exoskeleton.settings_m
         duration = motion.duration_s if duration_s is None else min(duration_s, motion.duration_s)
+        check_moves(marker_moves, duration)
         disturbed = bool(marker_moves) or soft_tissue is not None
         scene = build_scene(config, station.urdf_text, station.source, body, movable_plates=disturbed)
-        unknown = sorted({*config.encoders.joints, *settings} - set(scene.joint_address))
-        if unknown:
-            raise BadInputError(
-                f"{station.source}: the URDF has no joint {', '.join(unknown)}; see encoders.joints and settings_m"
-            )
+        _check_names(scene, station)
         exoskeleton = ExoskeletonMotion(
             scene, motion, duration_s=duration, settings_m=settings, urdf_text=station.urdf_text, source=station.source
         )
@@ -80,4 +76,24 @@ class World(StagedWorld):
             texture=texture,
             light=light,
             imaging=imaging,
+        )
+
+
+def _check_names(scene: Scene, station: LoadedStation) -> None:
+    config = station.config
+    joints = sorted({*config.encoders.joints, *config.exoskeleton.settings_m, *JOINTS} - set(scene.joint_address))
+    if joints:
+        raise BadInputError(
+            f"{station.source}: the URDF has no joint {', '.join(joints)}; see encoders.joints and settings_m (the simulated "
+            f"patient's exoskeleton needs {', '.join(sorted(JOINTS))})"
+        )
+    for name, camera in config.cameras.items():
+        if camera.link not in scene.links:
+            known = ", ".join(sorted(scene.links))
+            raise BadInputError(f'{station.source}: cameras.{name}.link: the URDF has no link "{camera.link}"; it has {known}')
+    links = sorted(LINKS - scene.links)
+    if links:
+        raise BadInputError(
+            f"{station.source}: the URDF has no link {', '.join(links)}, which the simulated patient's cuffs are fixed to; "
+            "name the links as config/armeo_spring.urdf does"
         )

@@ -89,5 +89,5 @@ def test_a_motion_file_is_recorded_under_its_name(tmp_path: Path) -> None:
 
 
 def test_a_folder_that_is_not_there_is_told(tmp_path: Path) -> None:
-    with pytest.raises(BadInputError, match=r"a.mcap: cannot write the recording: No such file or directory"):
+    with pytest.raises(BadInputError, match=r"a.mcap: cannot write the recording: no such folder; make .*none first"):
         simulate(options(tmp_path / "none" / "a.mcap"), lambda _: None)

@@ -89,14 +89,14 @@ def test_late_frames_hold_up_those_behind_them(bumpy: tuple[Recording, Simulatio
 def test_the_recording_tells_in_its_facts_alone_what_was_disturbed(tmp_path: Path) -> None:
     (tmp_path / "plain").mkdir()
     plain, _ = recorded(tmp_path / "plain", duration_s=0.05)
-    moves = (parse_shift("m1:x:0.02@4"), parse_shift("m0:y:-0.01"), parse_turn("m0:z:5"))
+    moves = (parse_shift("m1:x:0.02@0.04"), parse_shift("m0:y:-0.01"), parse_turn("m0:z:5"))
     recording, _ = recorded(tmp_path, "drop:r1:0.1", duration_s=0.05, marker_moves=moves, soft_tissue="published")
-    assert recording.facts["marker_shift"] == "m1:x:0.02@4 m0:y:-0.01"
+    assert recording.facts["marker_shift"] == "m1:x:0.02@0.04 m0:y:-0.01"
     assert recording.facts["marker_turn"] == "m0:z:5"
     assert recording.facts["soft_tissue"] == "published"
     assert recording.facts["fault"] == "drop:r1:0.1"
     assert recording.facts["command"] == (
-        "ghest-rt simulate --movement SIR --sensor paper --seed 2 --duration 0.05 --marker-shift m1:x:0.02@4 "
+        "ghest-rt simulate --movement SIR --sensor paper --seed 2 --duration 0.05 --marker-shift m1:x:0.02@0.04 "
         "--marker-shift m0:y:-0.01 --marker-turn m0:z:5 --soft-tissue published --fault drop:r1:0.1 --out a.mcap"
     )
     assert not {"marker_shift", "marker_turn", "soft_tissue", "fault"} & set(plain.facts)

@@ -1,5 +1,6 @@
 """Options that the studies share."""
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -113,8 +114,13 @@ def movements_of(
         motion: `--motion`.
         duration: `--duration`.
         small: With `--quick`, what is played unless named otherwise.
+
+    Raises:
+        BadInputError: The duration is none.
     """
     from ghest_rt.studies.movements import Movements as Played
 
+    if duration is not None and not math.isfinite(duration):
+        raise BadInputError(f"--duration {duration}: give a number of seconds; without --duration whole movements are played")
     named = Played(tuple(m.value for m in movement or ()), tuple(motion or ()), duration)
     return named if small is None else named.or_else(small)

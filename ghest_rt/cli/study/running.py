@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
 
-from ghest_rt.cli.console import print_json
+from ghest_rt.cli.console import print_json, printing
 from ghest_rt.studies.engine.cluster import ClusterExecutor
 from ghest_rt.studies.engine.local import LocalExecutor
 from ghest_rt.studies.engine.run import Executor
@@ -63,9 +63,10 @@ def finish(document: dict[str, Any], out: Path, as_json: bool, show: Callable[[d
     if as_json:
         print_json(document)
         return
-    console = Console()
-    show(document, console)
-    console.print(f"Tables, summary and figures: {out / document['study']}", markup=False)
+    with printing():
+        console = Console()
+        show(document, console)
+        console.print(f"Tables, summary and figures: {out / document['study']}", markup=False)
 
 
 def new_table(title: str, texts: Sequence[str], numbers: Sequence[str]) -> Table:

@@ -8,6 +8,7 @@ from typing import Any, cast
 
 import numpy as np
 
+from ghest_rt.errors import BadInputError
 from ghest_rt.geometry.so3 import Array
 from ghest_rt.studies.engine.run import Executor, Progress, run_tasks
 from ghest_rt.studies.engine.store import ResultStore
@@ -81,7 +82,7 @@ def latency(
         takes to find a marker and to answer.
 
     Raises:
-        BadInputError: A movement cannot be used.
+        BadInputError: A movement cannot be used, or so little is played that no speed is judged.
         GhestError: Tasks failed.
     """
     scenarios = settings.movements.scenarios(settings.sensor, settings.seed, METHODS)
@@ -96,6 +97,9 @@ def latency(
         for key in CANDIDATES
     ]
     pooled = {key: _pooled([result[key] for result in found]) for key in CANDIDATES}
+    bins = [row for key, (speeds, errors) in pooled.items() for row in _bins(key, speeds, errors)]
+    if not bins:
+        raise BadInputError(f"--duration {span_s:g}: no speed comes to {_LEAST_IN_BIN} samples; give more seconds")
     clinic = scenarios[0].undisturbed().model_copy(update={"duration_s": _COMPUTING_S}).world()
     computing = {
         method: measure_computing(clinic, method, settings.computing_frames, clock)
@@ -111,7 +115,7 @@ def latency(
             "span_s": span_s,
         },
         "rows": rows,
-        "bins": [row for key, (speeds, errors) in pooled.items() for row in _bins(key, speeds, errors)],
+        "bins": bins,
         "candidates": [
             {
                 "key": key,
