@@ -1,10 +1,13 @@
 """Schema of the station file (TOML). Unknown keys, wrong units and non-rigid matrices are refused."""
 
+import itertools
+from collections.abc import Callable
 from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import AfterValidator, Field, model_validator
 
+from ghest_rt.config.camera_devices import OakBackend, RealsenseBackend, RealsenseBagBackend
 from ghest_rt.config.devices import CameraBackend, EncoderBackend
 from ghest_rt.config.metrics import Metrics
 from ghest_rt.config.strict import Strict
@@ -13,8 +16,14 @@ from ghest_rt.geometry.so3 import Array
 
 STATION_FORMAT = 1
 
-# Farther from its link the elbow cannot be.
+# Out to this distance of chromaticities (shares of red, green and blue) a spot is taken for a disk of the nominal colour: two
+# nominal colours that are no farther apart than that pass for each other.
+COLOR_REACH = 0.24
+
+# No link of an exoskeleton for a limb is longer: farther from its link no elbow and no camera can be.
 _LONGEST_LINK_M = 1.0
+# Farther from its joint no marker is worn: the longest upper arms and shanks are under 0.5 m.
+_LONGEST_LIMB_M = 0.5
 
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]{1,64}$")]
 Row = tuple[float, float, float, float]
@@ -29,7 +38,22 @@ def _rigid(rows: tuple[Row, Row, Row, Row]) -> tuple[Row, Row, Row, Row]:
     return rows
 
 
+def _within(limit_m: float) -> Callable[[tuple[Row, Row, Row, Row]], tuple[Row, Row, Row, Row]]:
+    def check(rows: tuple[Row, Row, Row, Row]) -> tuple[Row, Row, Row, Row]:
+        length_m = float(np.linalg.norm([row[3] for row in rows[:3]]))
+        if length_m > limit_m:
+            raise ValueError(
+                f"the translation is {length_m:g} m long, more than {limit_m:g} m; "
+                "lengths are in metres: are these millimetres?"
+            )
+        return rows
+
+    return check
+
+
 RigidMatrix = Annotated[tuple[Row, Row, Row, Row], AfterValidator(_rigid)]
+LinkMatrix = Annotated[RigidMatrix, AfterValidator(_within(_LONGEST_LINK_M))]
+LimbMatrix = Annotated[RigidMatrix, AfterValidator(_within(_LONGEST_LIMB_M))]
 
 
 class Station(Strict):
@@ -59,6 +83,11 @@ class Exoskeleton(Strict):
     settings_m: dict[str, float] = Field(default={}, description="Prismatic joints set per patient, metres")
 
 
+def chromaticity(rgb: Rgb) -> Array:
+    """Return the (3,) shares of red, green and blue in a colour, which do not depend on its brightness."""
+    return np.array(rgb) / max(sum(rgb), 1)
+
+
 class Marker(Strict):
     """A square plate with one coloured disk per corner, eq. (5): p0 (+a,-a), p1 (-a,-a), p2 (+a,+a), p3 (-a,+a)."""
 
@@ -72,7 +101,15 @@ class Marker(Strict):
         if self.disk_radius_m >= self.half_spacing_m:
             raise ValueError("disk_radius_m must be less than half_spacing_m: the disks would touch")
         if 2 * (self.half_spacing_m + self.disk_radius_m) > self.plate_m:
-            raise ValueError("plate_m is too small for the disks")
+            raise ValueError("plate_m is too small for the disks; measure plate, disks and spacing again")
+        for one, other in itertools.combinations(range(4), 2):
+            apart = float(np.linalg.norm(chromaticity(self.disk_rgb[one]) - chromaticity(self.disk_rgb[other])))
+            if apart <= COLOR_REACH:
+                raise ValueError(
+                    f"disk_rgb: p{one} {self.disk_rgb[one]} and p{other} {self.disk_rgb[other]} are too much alike to be told "
+                    f"apart ({apart:.2f} between their chromaticities, {COLOR_REACH:g} is too little; brightness does not count); "
+                    "take disks of four different colours, like those of the shipped stations"
+                )
         return self
 
 
@@ -106,6 +143,15 @@ class Encoders(Strict):
     joints: tuple[str, ...] = Field(min_length=1, description="URDF joints measured, in the order they are sent")
     device: EncoderBackend = Field(discriminator="backend")
 
+    @model_validator(mode="after")
+    def _once_each(self) -> "Encoders":
+        twice = sorted({joint for joint in self.joints if self.joints.count(joint) > 1})
+        if twice:
+            raise ValueError(
+                f"joints names {', '.join(twice)} twice; name each joint once, in the order in which they are sent"
+            )
+        return self
+
 
 class CalibrationReference(Strict):
     """What a calibration session sees besides the markers: neutral posture, elbow bent, every marker where it belongs.
@@ -134,9 +180,9 @@ class Calibration(Strict):
     """Rigid transforms found by calibration, (4, 4) row by row, metres."""
 
     id: Name
-    link_from_camera: dict[str, RigidMatrix] = Field(description="Camera (OpenCV axes) in its link's frame, eq. (6)")
-    m0_from_gh: RigidMatrix = Field(description="GH joint frame in the m0 frame, eq. (8)")
-    m1_from_elw: RigidMatrix = Field(description="Elbow frame in the m1 frame, eq. (9)")
+    link_from_camera: dict[str, LinkMatrix] = Field(description="Camera (OpenCV axes) in its link's frame, eq. (6)")
+    m0_from_gh: LimbMatrix = Field(description="GH joint frame in the m0 frame, eq. (8)")
+    m1_from_elw: LimbMatrix = Field(description="Elbow frame in the m1 frame, eq. (9)")
     arm_length_m: float | None = Field(
         default=None, gt=0.1, lt=0.6, description="From elbow to GH centre; lets method fused see m1 slide along the arm"
     )
@@ -214,7 +260,26 @@ class StationConfig(Strict):
         for camera, marker in (("r0", "m0"), ("r1", "m1")):
             if self.cameras[camera].marker != marker:
                 raise ValueError(f"cameras.{camera}.marker must be {marker}: r0 sees the acromion, r1 the upper arm")
+        first, second = (_device_id(self.cameras[camera].device) for camera in ("r0", "r1"))
+        if first is not None and first == second:
+            raise ValueError(
+                f"cameras.r0 and cameras.r1 are the same device, {first}; "
+                "give each its own (ghest-rt doctor prints what is connected)"
+            )
         pronation = self.elbow.pronation_joint if self.elbow is not None else None
         if pronation is not None and pronation not in self.encoders.joints:
             raise ValueError(f"elbow.pronation_joint {pronation} is not one of encoders.joints")
         return self
+
+
+def _device_id(device: CameraBackend) -> str | None:
+    """Return what tells a camera from another of its kind, None for those that are made for each camera anew."""
+    match device:
+        case RealsenseBackend():
+            return f"serial {device.serial}"
+        case OakBackend():
+            return f"mxid {device.mxid}"
+        case RealsenseBagBackend():
+            return f"path {device.path}"
+        case _:
+            return None

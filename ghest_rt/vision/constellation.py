@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ghest_rt.config.station import COLOR_REACH
 from ghest_rt.geometry.so3 import Array
 from ghest_rt.vision.color_blobs import Blobs
 from ghest_rt.vision.disk_centers import Color
@@ -17,7 +18,6 @@ from ghest_rt.vision.layout import PLATE_LEVEL, MarkerLayout
 from ghest_rt.vision.optics import Optics
 from ghest_rt.vision.planar_pose import facing_homography, homography
 
-_COLOR_REACH = 0.24  # distance of chromaticities
 _PER_COLOR = 4
 _SKEW = 0.3  # difference of opposite sides, over the mean side
 _AREA_LOW, _AREA_HIGH = 0.55, 1.7
@@ -60,7 +60,7 @@ class ConstellationFinder:
         candidates = []
         for k in range(4):
             order = np.argsort(distance[k])[:_PER_COLOR]
-            candidates.append([int(b) for b in order if distance[k, b] < _COLOR_REACH and distance[:, b].argmin() == k])
+            candidates.append([int(b) for b in order if distance[k, b] < COLOR_REACH and distance[:, b].argmin() == k])
         places = blobs.centers_px.tolist()
         areas = blobs.areas_px.tolist()
         best: tuple[float, tuple[int | None, ...]] | None = None

@@ -62,6 +62,11 @@ def test_a_good_file_loads_with_its_urdf(tmp_path: Path) -> None:
         ('arm = "right"', 'arm = "middle"', ("station.arm", "'right' or 'left'")),
         ("half_spacing_m = 0.018", "half_spacing_m = 18.0", ("markers.m0.half_spacing_m", "less than 0.2", "millimetres?")),
         ("plate_m = 0.06", "plate_m = 0.04", ("markers.m0", "too small")),
+        ("[1.0, 0.0, 0.0, 0.0]", "[1.0, 0.0, 0.0, -55.0]", ("calibration.m0_from_gh", "55 m long", "0.5 m", "millimetres?")),
+        ("r1 = [[1.0, 0.0, 0.0, 0.0]", "r1 = [[1.0, 0.0, 0.0, -434]", ("calibration.link_from_camera.r1", "434", "in metres")),
+        ("[214, 40, 57], [124, 181, 24]", "[214, 40, 57], [214, 40, 57]", ("markers.m0", "p0", "p1", "too much alike")),
+        ("[214, 40, 57], [124, 181, 24]", "[214, 40, 57], [107, 20, 28]", ("markers.m0", "too much alike", "brightness")),
+        ('joints = ["j0", "j1"]', 'joints = ["j0", "j1", "j0"]', ("encoders", "joints names j0 twice")),
         ("r0 = [[1.0, 0.0", "r0 = [[2.0, 0.0", ("calibration.link_from_camera.r0", "not rigid")),
         ("r1 = [[1.0", "r2 = [[1.0", ("calibration.link_from_camera", "lacks r1")),
         ('marker = "m1"', 'marker = "m0"', ("cameras.r1.marker must be m1",)),
@@ -94,3 +99,16 @@ def test_missing_files_are_named(tmp_path: Path) -> None:
     (tmp_path / "binary.toml").write_bytes(b"\xff\xfe")
     with pytest.raises(BadInputError, match="UTF-8"):
         load_station(tmp_path / "binary.toml")
+
+
+@pytest.mark.parametrize(
+    ("device", "says"),
+    [
+        ('{ backend = "realsense", serial = "123" }', "the same device, serial 123"),
+        ('{ backend = "oak", mxid = "18" }', "the same device, mxid 18"),
+        ('{ backend = "realsense_bag", path = "a.bag" }', "the same device, path a.bag"),
+    ],
+)
+def test_one_device_cannot_be_both_cameras(device: str, says: str) -> None:
+    with pytest.raises(BadInputError, match=says):
+        parse_station(GOOD.replace('device = { backend = "sim" }', f"device = {device}", 2), "clinic.toml")
