@@ -81,7 +81,14 @@ Identity = Annotated[
     Path | None, typer.Option(metavar="FOLDER", help="Who you are, for endpoints with TLS", show_default=False)
 ]
 Duration = Annotated[
-    float | None, typer.Option("--duration", min=0.1, metavar="SECONDS", help="Stop after this long", show_default=False)
+    float | None,
+    typer.Option(
+        "--duration",
+        min=0.1,
+        metavar="SECONDS",
+        help="Stop after this long; exit code 3 if a device delivered nothing all along (without it, devices are waited for)",
+        show_default=False,
+    ),
 ]
 SimulatedMovement = Annotated[
     Movement,

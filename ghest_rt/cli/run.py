@@ -17,12 +17,13 @@ from ghest_rt.cli.scoreboard import Scoreboard
 from ghest_rt.config.devices import SimBackend
 from ghest_rt.config.load import LoadedStation, load_station
 from ghest_rt.config.station import StationConfig
-from ghest_rt.errors import BadInputError, GhestError
+from ghest_rt.errors import BadInputError, DeviceError, GhestError
 from ghest_rt.estimation.pipeline import Pipeline, lag_ns_of
 from ghest_rt.extras import need_extra
+from ghest_rt.messages.published import InputState
 from ghest_rt.service.clocks import ScaledClock
 from ghest_rt.service.compose import AnglesComposer, Numbering
-from ghest_rt.service.contract import ServiceSettings
+from ghest_rt.service.contract import ServiceSettings, ServiceSummary
 from ghest_rt.service.devices import make_devices, uses_simulation
 from ghest_rt.service.loop import Service
 from ghest_rt.service.notify import service_manager
@@ -72,6 +73,7 @@ def run_station(options: RunOptions) -> None:
 
     Raises:
         GhestError: The station file, a device's backend or the endpoint cannot be used.
+        DeviceError: With a duration: a device delivered nothing all along.
     """
     manager = service_manager()
     station = load_station(options.station)
@@ -124,6 +126,23 @@ def run_station(options: RunOptions) -> None:
     print_reports(Console(), [report_of(config.station.id, method, summary, scoreboard)], options.as_json, counts)
     if counts is not None and counts.failure:
         raise GhestError(f"the recording is not complete: {counts.failure}")
+    if options.duration_s is not None and world is None and not stop.is_set():
+        _refuse_absent(summary, options)
+
+
+def _refuse_absent(summary: ServiceSummary, options: RunOptions) -> None:
+    """End a run of fixed length in which a device was never there with the exit code for that.
+
+    Without a fixed length the service waits for devices as long as it runs, whoever restarts it or not.
+    """
+    silent = {name: counters.state for name, counters in summary.inputs.items() if not counters.received}
+    # The others are opened, and read only once every input is there.
+    absent = [name for name, state in silent.items() if state in (InputState.LOST, InputState.SILENT)] or list(silent)
+    if absent:
+        raise DeviceError(
+            f"{options.station}: {', '.join(absent)} delivered nothing in {options.duration_s:g} s; "
+            f"ghest-rt doctor --station {options.station} says what is missing"
+        )
 
 
 def _refuse_replay(config: StationConfig, path: Path) -> None:

@@ -107,7 +107,7 @@ class Marker(Strict):
             if apart <= COLOR_REACH:
                 raise ValueError(
                     f"disk_rgb: p{one} {self.disk_rgb[one]} and p{other} {self.disk_rgb[other]} are too much alike to be told "
-                    f"apart ({apart:.2f} between their chromaticities, {COLOR_REACH:g} is too little; brightness does not count); "
+                    f"apart ({apart:.2f} between their chromaticities, {COLOR_REACH:g} is too little, however bright they are); "
                     "take disks of four different colours, like those of the shipped stations"
                 )
         return self

@@ -65,7 +65,7 @@ def test_a_good_file_loads_with_its_urdf(tmp_path: Path) -> None:
         ("[1.0, 0.0, 0.0, 0.0]", "[1.0, 0.0, 0.0, -55.0]", ("calibration.m0_from_gh", "55 m long", "0.5 m", "millimetres?")),
         ("r1 = [[1.0, 0.0, 0.0, 0.0]", "r1 = [[1.0, 0.0, 0.0, -434]", ("calibration.link_from_camera.r1", "434", "in metres")),
         ("[214, 40, 57], [124, 181, 24]", "[214, 40, 57], [214, 40, 57]", ("markers.m0", "p0", "p1", "too much alike")),
-        ("[214, 40, 57], [124, 181, 24]", "[214, 40, 57], [107, 20, 28]", ("markers.m0", "too much alike", "brightness")),
+        ("[214, 40, 57], [124, 181, 24]", "[214, 40, 57], [107, 20, 28]", ("markers.m0", "too much alike", "however bright")),
         ('joints = ["j0", "j1"]', 'joints = ["j0", "j1", "j0"]', ("encoders", "joints names j0 twice")),
         ("r0 = [[1.0, 0.0", "r0 = [[2.0, 0.0", ("calibration.link_from_camera.r0", "not rigid")),
         ("r1 = [[1.0", "r2 = [[1.0", ("calibration.link_from_camera", "lacks r1")),
