@@ -4,7 +4,7 @@ import json
 import logging
 import os
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 
 import numpy as np
@@ -33,11 +33,6 @@ def set_up_logging(verbose: bool) -> None:
     root.setLevel(logging.WARNING)
     for name in ("ghest_rt", "ghest_drivers"):
         logging.getLogger(name).setLevel(logging.DEBUG if verbose else logging.INFO)
-
-
-def unused_in_words(unused: Mapping[str, int]) -> str:
-    """Say which samples were not used and how many, by the estimator's reasons; "" if all were."""
-    return "samples not used: " + ", ".join(f"{reason} x{unused[reason]}" for reason in sorted(unused)) if unused else ""
 
 
 @contextmanager

@@ -7,9 +7,10 @@ from pathlib import Path
 from rich.console import Console
 from rich.progress import Progress
 
-from ghest_rt.cli.console import print_json, printing, unused_in_words
+from ghest_rt.cli.console import print_json, printing
 from ghest_rt.cli.options import Method
 from ghest_rt.cli.table_file import Row, row_of, write_table, writer_for
+from ghest_rt.cli.unused_words import unused_in_words
 from ghest_rt.config.load import load_station
 from ghest_rt.estimation.angles import signs_of
 from ghest_rt.estimation.offline import estimate_events

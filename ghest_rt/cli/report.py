@@ -7,8 +7,9 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from ghest_rt.cli.console import print_json, unused_in_words
+from ghest_rt.cli.console import print_json
 from ghest_rt.cli.scoreboard import Scoreboard
+from ghest_rt.cli.unused_words import unused_in_words
 from ghest_rt.messages.published import Lateness
 from ghest_rt.service.contract import ServiceSummary
 from ghest_rt.service.health import SampleCounts

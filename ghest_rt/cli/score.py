@@ -11,8 +11,9 @@ from rich.console import Console
 from rich.progress import Progress, TaskID
 from rich.table import Table
 
-from ghest_rt.cli.console import print_json, printing, unused_in_words
+from ghest_rt.cli.console import print_json, printing
 from ghest_rt.cli.options import Method
+from ghest_rt.cli.unused_words import unused_in_words
 from ghest_rt.errors import BadInputError
 from ghest_rt.studies.score import RecordingScore, score_recording
 
@@ -21,7 +22,8 @@ def score_paths(paths: Sequence[Path], method: Method | None, as_json: bool) -> 
     """Score recordings, and all those of folders, and print a table or one JSON document.
 
     Raises:
-        BadInputError: A path holds no recording, or one without truth.
+        BadInputError: A path holds no recording, or one without truth or any angles to compare with it.
+        GhestError: Standard output is full.
     """
     files = [file for path in paths for file in _recordings(path)]
     console = Console(stderr=True)
@@ -60,6 +62,7 @@ def _mean(scores: Sequence[RecordingScore]) -> dict[str, float]:
         "m0_rmse_m": fmean(score.m0_rmse_m for score in scores),
         "m1_rmse_m": fmean(score.m1_rmse_m for score in scores),
         "published_orientation_rmse_deg": fmean(score.published_orientation_rmse_deg for score in scores),
+        "angles_fraction": fmean(score.angles_fraction for score in scores),
         "valid_fraction": fmean(score.valid_fraction for score in scores),
     }
 
@@ -70,9 +73,10 @@ def _print_table(scores: Sequence[RecordingScore]) -> None:
         title_justify="left",
         box=box.SIMPLE_HEAD,
         pad_edge=False,
+        padding=(0, 1, 0, 0),
     )
     table.add_column("recording", overflow="fold", min_width=10)
-    for column in ("method", "arm\n°", "at publ.\n°", "arm\nmm", "m0\nmm", "m1\nmm", "valid\n%"):
+    for column in ("method", "arm\n°", "at publ.\n°", "arm\nmm", "m0\nmm", "m1\nmm", "angles\n%", "valid\n%"):
         table.add_column(column, justify="right", no_wrap=True)
     for score in scores:
         table.add_row(
@@ -83,6 +87,7 @@ def _print_table(scores: Sequence[RecordingScore]) -> None:
             f"{score.position_rmse_m * 1000:.4f}",
             f"{score.m0_rmse_m * 1000:.4f}",
             f"{score.m1_rmse_m * 1000:.4f}",
+            f"{100 * score.angles_fraction:.2f}",
             f"{100 * score.valid_fraction:.2f}",
         )
     if len(scores) > 1:
@@ -96,12 +101,17 @@ def _print_table(scores: Sequence[RecordingScore]) -> None:
             f"{mean['position_rmse_m'] * 1000:.4f}",
             f"{mean['m0_rmse_m'] * 1000:.4f}",
             f"{mean['m1_rmse_m'] * 1000:.4f}",
+            f"{100 * mean['angles_fraction']:.2f}",
             f"{100 * mean['valid_fraction']:.2f}",
         )
     console = Console()
     console.print(table)
     console.print("at publ.: against the truth when the sample is published, as long after its own instant as the method lags")
+    console.print("angles: with angles, valid or degraded; the errors are theirs. Shares are of the samples after the start")
     for score in scores:
+        if score.lost:
+            lost = ", ".join(f"{reason} x{score.lost[reason]}" for reason in sorted(score.lost))
+            console.print(f"{Path(score.recording).name}: lost: {lost}", style="yellow", markup=False)
         if score.elbow_flexion_rmse_deg is not None:
             console.print(f"{Path(score.recording).name}: elbow flexion {score.elbow_flexion_rmse_deg:.2f}°", markup=False)
         for line in score.skipped:
