@@ -39,7 +39,8 @@ def unused_in_words(unused: Mapping[str, int]) -> str:
     Args:
         unused: Number by the estimator's reason: what it is about, `_`, and the reason.
     """
-    left_out, doubted = [], []
+    left_out: list[str] = []
+    doubted: list[str] = []
     for key in sorted(unused):
         about, _, reason = key.partition("_")
         (doubted if reason in DOUBTED else left_out).append(_in_words(about, reason, unused[key]))
