@@ -1,7 +1,8 @@
 """Run a recording through a method and compare with its truth."""
 
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import fmean
@@ -10,7 +11,7 @@ from ghest_rt.config.load import LoadedStation
 from ghest_rt.errors import BadInputError
 from ghest_rt.estimation.offline import estimate_events
 from ghest_rt.estimation.pipeline import Pipeline
-from ghest_rt.messages.results import GhEstimate, TruthSample
+from ghest_rt.messages.results import GhEstimate, Reason, Status, TruthSample
 from ghest_rt.recording.reader import Recording
 from ghest_rt.studies.metrics import ErrorAccumulator
 from ghest_rt.studies.truth import TruthTrack
@@ -31,7 +32,10 @@ class RecordingScore:
         m0_rmse_m: RMS distance between true and estimated position of marker m0 in the exoskeleton base frame.
         m1_rmse_m: The same of marker m1.
         samples: Instants of the grid.
-        valid_fraction: Share of them with status `valid`.
+        starting: Of these before every input had arrived; the shares are of the others, as those of a live run are.
+        angles_fraction: Share with angles, those of status `degraded` too.
+        valid_fraction: Share with status `valid`.
+        lost: Samples without angles, by reason; those before the start are not among them.
         skipped: What of the recording could not be used.
         unused: Samples that the estimator did not use, by reason.
         published_orientation_rmse_deg: As `orientation_rmse_deg`, against the truth at the instant when a sample is published
@@ -46,7 +50,10 @@ class RecordingScore:
     m0_rmse_m: float
     m1_rmse_m: float
     samples: int
+    starting: int
+    angles_fraction: float
     valid_fraction: float
+    lost: dict[str, int]
     skipped: tuple[str, ...]
     unused: dict[str, int]
     published_orientation_rmse_deg: float
@@ -101,7 +108,7 @@ def run_with_truth(
 def score_recording(
     path: Path, method: Method | None = None, station: LoadedStation | None = None, progress: Progress | None = None
 ) -> RecordingScore:
-    """Score one recording; arguments and errors as of `run_with_truth`."""
+    """Score one recording; arguments and errors as of `run_with_truth`, and `BadInputError` where nothing can be judged."""
     run = run_with_truth(path, method, station, progress)
     errors, published = ErrorAccumulator(), ErrorAccumulator()
     elbow_rad: list[float] = []
@@ -111,6 +118,14 @@ def score_recording(
         published.add(estimate, run.truth.at(estimate.t_sample_ns + run.lag_ns))
         if estimate.elbow is not None and truth is not None and truth.elbow_rad is not None:
             elbow_rad.append(estimate.elbow.flexion_rad - truth.elbow_rad[0])
+    after_start = [estimate for estimate in run.estimates if estimate.reason is not Reason.STARTING]
+    statuses = Counter(estimate.status for estimate in after_start)
+    lost = Counter(str(estimate.reason) for estimate in after_start if estimate.status is Status.LOST)
+    if not errors.judged:
+        raise BadInputError(
+            f"{path}: method {run.method} finds nothing to compare with the truth, {errors.samples} samples, {_times(lost)}; "
+            "is it the method for these markers (--method)?"
+        )
     rms = errors.rms()
     return RecordingScore(
         recording=str(path),
@@ -120,12 +135,19 @@ def score_recording(
         m0_rmse_m=rms.m0_m,
         m1_rmse_m=rms.m1_m,
         samples=errors.samples,
-        valid_fraction=errors.valid_fraction,
+        starting=errors.samples - len(after_start),
+        angles_fraction=(len(after_start) - statuses[Status.LOST]) / len(after_start),
+        valid_fraction=statuses[Status.VALID] / len(after_start),
+        lost=dict(lost),
         skipped=tuple(str(problem) for problem in run.recording.problems),
         unused=run.unused,
         published_orientation_rmse_deg=math.degrees(published.rms().orientation_rad),
         elbow_flexion_rmse_deg=math.degrees(math.sqrt(fmean(e * e for e in elbow_rad))) if elbow_rad else None,
     )
+
+
+def _times(counts: Mapping[str, int]) -> str:
+    return ", ".join(f"{reason} x{counts[reason]}" for reason in sorted(counts)) or "all before the start"
 
 
 def _keep_truth(events: Iterable[object], truth: TruthTrack) -> Iterator[object]:

@@ -5,8 +5,13 @@ from pathlib import Path
 
 import cv2
 import pytest
+from typer.testing import CliRunner
 
+from ghest_rt.cli.main import app
 from ghest_rt.errors import BadInputError
+from ghest_rt.simulation.command import simulate
+from ghest_rt.simulation.faults import parse_fault
+from ghest_rt.simulation.options import SimulateOptions
 from ghest_rt.studies.picture import draw_recording
 from ghest_rt.studies.score import score_recording
 
@@ -22,6 +27,35 @@ def test_refined_is_many_times_better_than_the_papers_steps_on_the_same_images(m
     assert refined.position_rmse_m < 0.1e-3
     assert 0.25 < paper.orientation_rmse_deg < 1.5
     assert paper.orientation_rmse_deg > 10 * refined.orientation_rmse_deg
+
+
+def test_what_is_lost_is_told_by_reason_and_the_errors_are_of_the_rest(tmp_path: Path) -> None:
+    out = tmp_path / "a.mcap"
+    blind = parse_fault("blind:r1:0.3:0.4")
+    simulate(SimulateOptions(out=out, movement="SFE", duration_s=1.0, seed=2, faults=(blind,)), lambda _: None)
+    score = score_recording(out, "refined")
+    assert set(score.lost) == {"m1_not_seen"}
+    assert score.lost["m1_not_seen"] / (score.samples - score.starting) == pytest.approx(1.0 - score.angles_fraction)
+    assert 0.2 < 1.0 - score.angles_fraction < 0.45
+    assert score.valid_fraction <= score.angles_fraction
+    assert score.orientation_rmse_deg < 0.05
+
+
+def test_a_method_that_finds_nothing_is_told() -> None:
+    told = r"SFE.mcap: method aruco finds nothing to compare with the truth, \d+ samples, m0_not_seen x\d+; is it the method"
+    with pytest.raises(BadInputError, match=told):
+        score_recording(FIXTURES / "SFE.mcap", "aruco")
+
+
+def test_the_table_says_how_much_was_lost_and_why(tmp_path: Path) -> None:
+    out = tmp_path / "a.mcap"
+    simulate(
+        SimulateOptions(out=out, movement="SFE", duration_s=0.5, faults=(parse_fault("blind:r0:0.3:0.1"),)), lambda _: None
+    )
+    result = CliRunner().invoke(app, ["score", str(out), "--method", "paper"])
+    assert result.exit_code == 0, result.output
+    assert "angles" in result.stdout
+    assert "a.mcap: lost: m0_not_seen x" in result.stdout
 
 
 def test_the_manifest_describes_the_shipped_files() -> None:
