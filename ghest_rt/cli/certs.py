@@ -42,8 +42,8 @@ _DEFAULT_PKI = Path("ghest-pki")
 _USED_BY = {Role.STATION: "[publisher] identity", Role.ROUTER: "ghest-rt gateway --identity"}
 
 
-@app.callback()
-def _check_installation() -> None:
+def _needs_security() -> None:
+    """Checked by the commands themselves when they run: their help needs nothing."""
     need_extra("security", "an authority")
 
 
@@ -54,6 +54,7 @@ def init(
     days: _Days = _AUTHORITY_DAYS,
 ) -> None:
     """Make the clinic's authority."""
+    _needs_security()
     from ghest_rt.security.authority import Authority  # noqa: PLC0415  (needs the extra `security`)
 
     authority = Authority.create(pki, clinic, days)
@@ -124,6 +125,7 @@ def check(
     ] = None,
 ) -> None:
     """Say whether an identity can be used, and why a station refuses it."""
+    _needs_security()
     from ghest_rt.security.handshake import try_handshake  # noqa: PLC0415  (needs the extra `security`)
     from ghest_rt.security.identity_check import load_identity  # noqa: PLC0415  (needs the extra `security`)
 
@@ -138,6 +140,7 @@ def check(
 
 
 def _open(pki: Path) -> "Authority":
+    _needs_security()
     from ghest_rt.security.authority import Authority  # noqa: PLC0415  (needs the extra `security`)
 
     return Authority(pki)

@@ -1,10 +1,14 @@
 """A part of the installation that is missing: one message, one exit code."""
 
+import subprocess
+import sys
 import tomllib
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
+from ghest_rt.cli.main import app
 from ghest_rt.cli.table_file import writer_for
 from ghest_rt.errors import GhestError
 from ghest_rt.extras import MODULES_OF_EXTRA, missing_modules, need_extra
@@ -37,3 +41,37 @@ def test_a_parquet_file_needs_the_extra_and_a_csv_file_does_not(tmp_path: Path, 
     with pytest.raises(GhestError, match=r"angles.parquet .* needs pyarrow") as caught:
         writer_for(tmp_path / "angles.parquet")
     assert caught.value.exit_code == 1
+
+
+_EVERY_HELP = """
+import sys
+from typer.main import get_command
+from typer.testing import CliRunner
+from ghest_rt.extras import MODULES_OF_EXTRA
+
+sys.modules.update(dict.fromkeys((name for names in MODULES_OF_EXTRA.values() for name in names), None))
+from ghest_rt.cli.main import app
+
+
+def walk(command, words):
+    done = CliRunner().invoke(app, [*words, "--help"])
+    if done.exit_code:
+        print(*words, done.exception)
+    for name, child in getattr(command, "commands", {}).items():
+        walk(child, [*words, name])
+
+
+walk(get_command(app), [])
+"""
+
+
+def test_help_needs_no_extra() -> None:
+    done = subprocess.run([sys.executable, "-c", _EVERY_HELP], capture_output=True, text=True, check=False)
+    assert (done.stdout, done.stderr) == ("", "")
+
+
+def test_what_runs_without_its_extra_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    for words in (["init", "--clinic", "A"], ["list"], ["check", str(tmp_path)], ["revoke", "therapy.game-1"]):
+        with pytest.raises(GhestError, match="an authority needs cryptography"):
+            CliRunner().invoke(app, ["certs", *words], catch_exceptions=False)
