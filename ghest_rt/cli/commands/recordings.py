@@ -7,6 +7,7 @@ import typer
 
 from ghest_rt.cli.options import (
     MOVEMENTS,
+    ArmAxis,
     Faults,
     ImageFaults,
     Json,
@@ -140,3 +141,42 @@ def picture(
     from ghest_rt.cli.picture import draw
 
     draw(recording, out, method)
+
+
+@app.command()
+def calibrate(
+    recording: RecordingFile,
+    station: Annotated[Path, typer.Option(metavar="FILE", help="Station file to calibrate", show_default=False)],
+    out: Annotated[
+        Path, typer.Option(metavar="FILE", help="New station file to write, beside the old one", show_default=False)
+    ],
+    calibration_id: Annotated[
+        str | None, typer.Option("--id", metavar="NAME", help="Of the new calibration; the recording's name otherwise")
+    ] = None,
+    elbow: Annotated[
+        ArmAxis, typer.Option(help="What gives the arm's axis: the neutral posture, or the exoskeleton's elbow")
+    ] = (ArmAxis.POSTURE),
+    arm_length_m: Annotated[
+        float | None,
+        typer.Option("--arm-length", metavar="METRES", min=0.15, max=0.5, help="From elbow to GH centre as measured"),
+    ] = None,
+    picture: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Picture of the residuals to write: .png, .svg or .pdf")
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", metavar="", help="Overwrite the output file")] = False,
+    as_json: Json = False,
+) -> None:
+    """Calibrate a station by a recorded session: neutral posture, then the shoulder moved about (docs/calibration.md)."""
+    from ghest_rt.cli.calibrate import calibrate_recording
+
+    calibrate_recording(
+        recording,
+        station,
+        out,
+        calibration_id=calibration_id,
+        elbow_from=elbow.value,
+        arm_length_m=arm_length_m,
+        picture=picture,
+        force=force,
+        as_json=as_json,
+    )

@@ -1,0 +1,92 @@
+"""The neutral posture that a calibration session begins with: where it is in the recording, and how still it was."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ghest_rt.calibration.session import Session
+from ghest_rt.geometry.so3 import Array, nearest_rotation
+
+LEAST_S = 2.0
+"""So long a posture must be held."""
+BEGINS_WITHIN_S = 15.0
+"""After so long in the recording it is not looked for any more."""
+STILL_RAD = math.radians(0.8)
+"""Of each marker, root mean square."""
+STILL_M = 0.005
+
+_STEP_S = 0.25
+_LEAST_INSTANTS = 30
+_WAY_OFF = 2.0  # times STILL_RAD: where the newest part of a hold is, it has ended
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Hold:
+    """A posture held still.
+
+    Attributes:
+        within: (n,) which instants of the session belong to it.
+        start_s: When it begins.
+        end_s: When it ends.
+        e_from_m0: (3, 3) mean attitude of m0.
+        e_from_m1: (3, 3) mean attitude of m1.
+        m0_rad: By how much m0's attitude strayed, root mean square.
+        m1_rad: The same of m1.
+    """
+
+    within: NDArray[np.bool_]
+    start_s: float
+    end_s: float
+    e_from_m0: Array
+    e_from_m1: Array
+    m0_rad: float
+    m1_rad: float
+
+
+def find_hold(session: Session) -> Hold | None:
+    """Return the first still stretch of at least `LEAST_S`, as long as it lasts; None if there is none."""
+    if not len(session.t_s):
+        return None
+    start_s = float(session.t_s[0])
+    while start_s <= BEGINS_WITHIN_S:
+        hold = _held(session, start_s, start_s + LEAST_S)
+        if hold is not None:
+            return _as_long_as_it_lasts(session, hold)
+        start_s += _STEP_S
+    return None
+
+
+def _as_long_as_it_lasts(session: Session, hold: Hold) -> Hold:
+    while True:
+        newest = _held(session, hold.end_s, hold.end_s + _STEP_S, least=5)
+        longer = _held(session, hold.start_s, hold.end_s + _STEP_S)
+        if newest is None or longer is None:
+            return hold
+        for mean, now in ((hold.e_from_m0, newest.e_from_m0), (hold.e_from_m1, newest.e_from_m1)):
+            if _angle_rad(mean, now[None])[0] > _WAY_OFF * STILL_RAD:
+                return hold
+        hold = longer
+
+
+def _held(session: Session, start_s: float, end_s: float, least: int = _LEAST_INSTANTS) -> Hold | None:
+    """Return a stretch if it is still."""
+    within = (session.t_s >= start_s) & (session.t_s < end_s)
+    if np.count_nonzero(within) < least:
+        return None
+    means, strays = [], []
+    for poses in (session.e_from_m0[within], session.e_from_m1[within]):
+        mean = nearest_rotation(poses[:, :3, :3].mean(axis=0))
+        stray_rad = float(np.sqrt(np.mean(_angle_rad(mean, poses[:, :3, :3]) ** 2)))
+        if stray_rad > STILL_RAD or float(np.sqrt(poses[:, :3, 3].var(axis=0).sum())) > STILL_M:
+            return None
+        means.append(mean)
+        strays.append(stray_rad)
+    return Hold(within, start_s, end_s, means[0], means[1], strays[0], strays[1])
+
+
+def _angle_rad(mean: Array, rotations: Array) -> Array:
+    """Return the (n,) angles between a rotation and others, exact for small ones, too."""
+    apart = np.linalg.norm(rotations - mean, axis=(1, 2))  # = sqrt(8) sin(angle / 2)
+    return np.asarray(2.0 * np.arcsin(np.clip(apart / math.sqrt(8.0), 0.0, 1.0)))
