@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from ghest_rt.config.strict import Strict
+from ghest_rt.config.strict import BINARY_FIELD_FORM, BYTES_FORM, TEXT_FIELD_FORM, Strict
 
 ChecksumName = Literal["crc32", "crc16_ccitt", "crc16_modbus", "crc8_j1850", "xor8"]
 
@@ -48,8 +48,8 @@ class BinaryLayout(Strict):
     """A binary frame: sync, fields, checksum. Fields read "name:type"; length, seq, time, status and pad are special names."""
 
     kind: Literal["binary"]
-    sync_hex: str = Field(default="a55a", pattern=r"^([0-9A-Fa-f]{2}){1,8}$")
-    fields: tuple[Annotated[str, Field(pattern=r"^[A-Za-z0-9_]+:[uif](8|16|32|64)$")], ...] = Field(min_length=1)
+    sync_hex: str = Field(default="a55a", pattern=BYTES_FORM)
+    fields: tuple[Annotated[str, Field(pattern=BINARY_FIELD_FORM)], ...] = Field(min_length=1)
     byte_order: Literal["little", "big"] = "little"
     length_counts: Literal["payload", "frame"] = "payload"
     checksum: ChecksumName = "crc32"
@@ -60,7 +60,7 @@ class TextLayout(Strict):
     """A line of numbers. Fields seq, time, status and skip are special names."""
 
     kind: Literal["text"]
-    fields: tuple[Annotated[str, Field(pattern=r"^[A-Za-z0-9_]+$")], ...] = Field(min_length=1)
+    fields: tuple[Annotated[str, Field(pattern=TEXT_FIELD_FORM)], ...] = Field(min_length=1)
     delimiter: str = Field(default=";", min_length=1, max_length=1)
     prefix: str = Field(default="", max_length=32)
     decimal_comma: bool = False

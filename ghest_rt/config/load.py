@@ -1,5 +1,6 @@
 """Read a station file; every problem is told with file, key path and remedy."""
 
+import json
 import stat
 import tomllib
 from dataclasses import dataclass
@@ -7,12 +8,12 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
+from ghest_rt.config.problems import problems_in_words
 from ghest_rt.config.station import StationConfig
 from ghest_rt.errors import BadInputError
 
 _MAX_BYTES = 1_000_000
 _MAX_DOTS = 200  # in one line: the parser's time grows with the square of a dotted key's length
-_REMEDIES = {"missing": "add this key", "extra_forbidden": "remove it or correct its spelling"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,21 +44,16 @@ def parse_station(toml_text: str, source: str) -> StationConfig:
             raise BadInputError(f"{source}: line {number} has more than {_MAX_DOTS} dots; is it a station file?")
     try:
         document = tomllib.loads(toml_text)
+        # By way of JSON: strict there takes arrays and whole numbers for what they are, but no text for a number.
+        as_json = json.dumps(document, default=_no_json)
     except ValueError as error:  # TOMLDecodeError, and numbers of thousands of digits
         raise BadInputError(f"{source}: not a valid TOML file: {error}") from error
     except RecursionError as error:
         raise BadInputError(f"{source}: tables or arrays nested too deeply; is it a station file?") from error
     try:
-        return StationConfig.model_validate(document)
+        return StationConfig.model_validate_json(as_json, strict=True)
     except ValidationError as error:
-        lines = []
-        for item in error.errors(include_url=False):
-            key = ".".join(str(part) for part in item["loc"]) or "(file)"
-            message = item["msg"].removeprefix("Value error, ")
-            remedy = _REMEDIES.get(item["type"], "correct it")
-            if item["type"] == "less_than" and key.endswith("_m"):
-                remedy = "this key is in metres; are these millimetres?"
-            lines.append(f"  {key}: {message} ({remedy})")
+        lines = [f"  {line}" for line in problems_in_words(document, error, StationConfig)]
         raise BadInputError(f"{source}: not a valid station file:\n" + "\n".join(lines)) from error
 
 
@@ -72,6 +68,11 @@ def load_station(path: Path) -> LoadedStation:
     urdf_path = path.parent / config.exoskeleton.urdf
     urdf_text = _read_text(urdf_path, f"URDF named by exoskeleton.urdf in {path}")
     return LoadedStation(config, toml_text, urdf_text, str(path))
+
+
+def _no_json(value: object) -> list[str]:
+    """Return dates and times of day, which no key takes, as something that no key takes for text."""
+    return [str(value)]
 
 
 def _read_text(path: Path, what: str) -> str:

@@ -10,7 +10,7 @@ from pydantic import AfterValidator, Field, model_validator
 from ghest_rt.config.camera_devices import OakBackend, RealsenseBackend, RealsenseBagBackend
 from ghest_rt.config.devices import CameraBackend, EncoderBackend
 from ghest_rt.config.metrics import Metrics
-from ghest_rt.config.strict import Strict
+from ghest_rt.config.strict import NAME_FORM, Strict
 from ghest_rt.geometry.se3 import rigidity_problem
 from ghest_rt.geometry.so3 import Array
 
@@ -25,7 +25,7 @@ _LONGEST_LINK_M = 1.0
 # Farther from its joint no marker is worn: the longest upper arms and shanks are under 0.5 m.
 _LONGEST_LIMB_M = 0.5
 
-Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]{1,64}$")]
+Name = Annotated[str, Field(pattern=NAME_FORM)]
 Row = tuple[float, float, float, float]
 Byte = Annotated[int, Field(ge=0, le=255)]
 Rgb = tuple[Byte, Byte, Byte]
@@ -107,7 +107,7 @@ class Marker(Strict):
             if apart <= COLOR_REACH:
                 raise ValueError(
                     f"disk_rgb: p{one} {self.disk_rgb[one]} and p{other} {self.disk_rgb[other]} are too much alike to be told "
-                    f"apart ({apart:.2f} between their chromaticities, {COLOR_REACH:g} is too little, however bright they are); "
+                    f"apart: {apart:.2f} between their chromaticities, {COLOR_REACH:g} is too little, however bright they are; "
                     "take disks of four different colours, like those of the shipped stations"
                 )
         return self
@@ -204,8 +204,8 @@ class Estimator(Strict):
         le=500.0,
         description="A sample is published this long after the instant it holds for; method fused forecasts, and has none",
     )
-    max_gap_ms: float = Field(default=100.0, gt=0, description="Longest gap in an input that is interpolated over")
-    sigma_limit_deg: float = Field(default=5.0, gt=0, description="Above this the sample is `degraded`")
+    max_gap_ms: float = Field(default=100.0, gt=0, le=1000, description="Longest gap in an input that is interpolated over")
+    sigma_limit_deg: float = Field(default=5.0, gt=0, le=180, description="Above this the sample is `degraded`")
 
 
 class Publisher(Strict):

@@ -59,6 +59,22 @@ def test_a_good_file_loads_with_its_urdf(tmp_path: Path) -> None:
     [
         ('arm = "right"', 'arm = "right"\nmode = 1', ("station.mode", "remove it")),
         ('arm = "right"', "", ("station.arm", "add this key")),
+        ('arm = "right"', 'am = "right"', ("station.am: is not known here; did you mean arm?",)),
+        ("[calibration]", "[estimator]\nlag_msec = 1.0\n[calibration]", ("estimator.lag_msec", "did you mean lag_ms?")),
+        ("[calibration]", "[estimator]\nmax_gap_ms = 1e6\n[calibration]", ("estimator.max_gap_ms", "at most 1000")),
+        ("[calibration]", "[estimator]\nsigma_limit_deg = 1e6\n[calibration]", ("sigma_limit_deg", "at most 180")),
+        ("format = 1", 'format = 1\nrate_hz = "66"', ("rate_hz: must be a number, not", "without quotes")),
+        ("format = 1", "format = 1\nrate_hz = nan", ("rate_hz: must be a finite number",)),
+        ("format = 1", "format = 1\nrate_hz = 0.5", ("rate_hz: must be at least 1, is 0.5",)),
+        ('id = "test"', 'id = "a b"', ("station.id", "letters, digits, - and _")),
+        ('id = "test"', "id = 1979-05-27", ("station.id: must be text in quotes",)),
+        ("[cameras.r0]", '[cameras."r 0"]', ('cameras."r 0"', "letters, digits")),
+        ('backend = "sim"', 'backend = "simm"', ("cameras.r0.device.backend", "did you mean sim?")),
+        ('backend = "sim"', "width_px = 3", ("cameras.r0.device.backend: is missing",)),
+        ('backend = "sim"', 'backend = "sim", sensor = "x"', ("cameras.r0.device.sensor: must be 'paper' or 'sr300'",)),
+        ('joints = ["j0", "j1"]', "joints = []", ("encoders.joints: must not be empty",)),
+        ("[214, 40, 57]", "[214, 40, 300]", ("markers.m0.disk_rgb[0][2]: must be at most 255",)),
+        ("[214, 40, 57]", "[214, 40]", ("markers.m0.disk_rgb[0][2]: is missing",)),
         ('arm = "right"', 'arm = "middle"', ("station.arm", "'right' or 'left'")),
         ("half_spacing_m = 0.018", "half_spacing_m = 18.0", ("markers.m0.half_spacing_m", "less than 0.2", "millimetres?")),
         ("plate_m = 0.06", "plate_m = 0.04", ("markers.m0", "too small")),
@@ -112,3 +128,34 @@ def test_missing_files_are_named(tmp_path: Path) -> None:
 def test_one_device_cannot_be_both_cameras(device: str, says: str) -> None:
     with pytest.raises(BadInputError, match=says):
         parse_station(GOOD.replace('device = { backend = "sim" }', f"device = {device}", 2), "clinic.toml")
+
+
+SERIAL = 'joints = ["j0", "j1"]\ndevice = { backend = "serial", port = "/dev/x", %s }'
+
+
+@pytest.mark.parametrize(
+    ("device", "lines"),
+    [
+        ('layout = { kind = "binary", fields = ["a0:i12"] }', ["encoders.device.layout.fields[0]: must read name:type"]),
+        (
+            'layout = { kind = "binary", fields = [], sync_hex = "z" }',
+            ["encoders.device.layout.sync_hex: must be 1 to 8 bytes", "encoders.device.layout.fields: must not be empty"],
+        ),
+        ("channels = { j0 = { sgn = 1 } }", ["encoders.device.channels.j0.sgn: is not known here; did you mean sign?"]),
+        ("baud = 1.5, bauds = 1", ["encoders.device.bauds: is not known", "encoders.device.baud: must be a whole number"]),
+    ],
+)
+def test_each_mistake_is_one_line_with_the_key_as_it_stands_in_the_file(device: str, lines: list[str]) -> None:
+    text = GOOD.replace('joints = ["j0", "j1"]\ndevice = { backend = "sim" }', SERIAL % device)
+    with pytest.raises(BadInputError) as caught:
+        parse_station(text, "clinic.toml")
+    told = str(caught.value).splitlines()[1:]
+    assert len(told) == len(lines)
+    for line, begins in zip(told, lines, strict=True):
+        assert line.startswith(f"  {begins}")
+
+
+def test_a_table_with_a_wrong_name_is_not_said_to_be_missing_besides() -> None:
+    with pytest.raises(BadInputError) as caught:
+        parse_station(GOOD.replace("[station]", "[statoin]"), "clinic.toml")
+    assert str(caught.value).splitlines()[1:] == ["  statoin: is not known here; did you mean station?"]
