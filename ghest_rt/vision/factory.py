@@ -39,6 +39,9 @@ def make_detector(
         return ArucoDetector(camera_name, marker_name, marker, info)
     if method == "paper":
         if color_only:
-            raise BadInputError("method paper cannot work from colour alone: eq. (3) reads every disk's position from depth")
+            raise BadInputError(
+                f"cameras.{camera_name}.depth is false, and method paper cannot work from colour alone: eq. (3) reads every disk's "
+                "position from depth; choose another method (estimator.method, --method)"
+            )
         return PaperDetector(camera_name, marker_name, marker, info)
     raise BadInputError(f"no vision method {method!r}; choose one of paper, refined, aruco, photometric")

@@ -50,7 +50,7 @@ def test_no_such_file(tmp_path: Path) -> None:
         (_GOOD.with_(format="2"), ["recording format '2'", "reads '1'"]),
         (_GOOD.with_(attachments=("exoskeleton.urdf",)), ["attachment station.toml is missing"]),
         (_GOOD.with_(attachments=("station.toml",)), ["attachment exoskeleton.urdf is missing"]),
-        (_GOOD.with_(station_toml="format = 1\nspeed = 3"), ["attachment station.toml", "speed", "station: Field required"]),
+        (_GOOD.with_(station_toml="format = 1\nspeed = 3"), ["attachment station.toml", "speed", "station: is missing"]),
         (_GOOD.with_(station_toml=STATION_TOML + "#" * 1_000_001), ["station.toml is larger than 1000000 bytes"]),
         (_GOOD.with_(leave_out=("/encoders/joints",)), ["no topic /encoders/joints"]),
         (_GOOD.with_(leave_out=("/r1/color/image", "/r0/info")), ["no topic /r0/info, /r1/color/image"]),
