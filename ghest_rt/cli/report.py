@@ -129,7 +129,8 @@ def print_reports(
     console.print(table)
     for report in reports:
         if report.skipped_frames:
-            console.print(f"{report.source}: {report.skipped_frames} frames skipped, vision was slower than the cameras")
+            frames = "1 frame" if report.skipped_frames == 1 else f"{report.skipped_frames} frames"
+            console.print(f"{report.source}: {frames} skipped, vision was slower than the cameras")
         if report.degraded_fraction:
             console.print(f"{report.source}: {100.0 * report.degraded_fraction:.2f} % degraded, with angles")
         if report.unused:

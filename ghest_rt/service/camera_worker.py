@@ -47,6 +47,8 @@ class CameraWorker:
         self._stop = threading.Event()
         self._go = threading.Event()
         self._loop: asyncio.AbstractEventLoop | None = None
+        self._first_ns = -1
+        self._skips_told = False
 
     def start(self, loop: asyncio.AbstractEventLoop) -> None:
         """Open the camera on a thread of its own."""
@@ -146,15 +148,18 @@ class CameraWorker:
         """
         self.counters.count(frame.seq, frame.t_capture_ns)
         t_begin_ns = self._clock.now_ns()
+        if self._first_ns < 0:
+            self._first_ns = t_begin_ns
         while frame.t_arrival_ns <= t_begin_ns and self._clock.now_ns() - frame.t_arrival_ns > self._settings.max_backlog_ns:
             try:
                 newer = self._camera.read(0.0)
             except (ReadTimeout, EndOfStream):
                 break
             self.counters.count(newer.seq, newer.t_capture_ns)
-            if not self.counters.skipped:
-                self._event(EventKind.FRAMES_SKIPPED, "warning", "vision is slower than the camera: old frames are passed over")
             self.counters.skipped += 1
+            if not self._skips_told and t_begin_ns - self._first_ns >= self._settings.settled_after_ns:
+                self._skips_told = True
+                self._event(EventKind.FRAMES_SKIPPED, "warning", "vision is slower than the camera: old frames are passed over")
             frame = newer
         return frame
 

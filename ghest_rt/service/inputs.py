@@ -42,6 +42,7 @@ class InputSettings:
         silent_after: Reads in vain until the input is reported as silent.
         lost_after: Reads in vain until the device is closed and opened again.
         max_backlog_ns: A frame that has waited longer than this since its arrival gives way to a newer one.
+        settled_after_ns: Frames passed over so soon after the first are only counted: they waited for what is done once.
         reconnect: Whether a lost device is opened again; if not (recordings), the input has ended with an error.
         backoff: The pauses before that.
     """
@@ -50,6 +51,7 @@ class InputSettings:
     silent_after: int = 2
     lost_after: int = 20
     max_backlog_ns: int = 30_000_000
+    settled_after_ns: int = 1_000_000_000
     reconnect: bool = True
     backoff: Backoff = Backoff()
 

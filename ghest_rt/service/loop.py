@@ -276,7 +276,8 @@ class Service:
         if message.status is not self._told_status and message.reason is not Reason.STARTING:
             self._told_status = message.status
             severity: Severity = "warning" if message.status is Status.LOST else "info"
-            self._events.tell(EventKind.STATUS_CHANGED, severity, "service", f"{message.status} ({message.reason})")
+            reason = "" if message.reason is Reason.NONE else f" ({message.reason})"
+            self._events.tell(EventKind.STATUS_CHANGED, severity, "service", f"{message.status}{reason}")
 
     def _fail(self, error: BaseException) -> None:
         if self._failure is None:

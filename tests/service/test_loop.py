@@ -130,13 +130,15 @@ async def test_unusable_data_is_counted_and_told_once() -> None:
     assert rig.out.kinds("r1").count(EventKind.BAD_DATA) == 1
 
 
-async def test_slow_vision_neither_delays_a_tick_nor_works_on_old_frames() -> None:
+@pytest.mark.parametrize(("settled_after_ns", "told"), [(0, 1), (10**12, 0)])
+async def test_slow_vision_neither_delays_a_tick_nor_works_on_old_frames(settled_after_ns: int, told: int) -> None:
     release = threading.Event()
 
     def slow(frame: object) -> None:
         release.wait(10.0)
 
-    rig = Rig(InputSettings(read_timeout_s=0.01, lost_after=10_000, max_backlog_ns=0), observe_hook=slow)
+    settings = InputSettings(read_timeout_s=0.01, lost_after=10_000, max_backlog_ns=0, settled_after_ns=settled_after_ns)
+    rig = Rig(settings, observe_hook=slow)
 
     async def scene() -> None:
         rig.feed(0)
@@ -151,7 +153,7 @@ async def test_slow_vision_neither_delays_a_tick_nor_works_on_old_frames() -> No
     assert [seq for name, seq in rig.pipelines[0].observed if name == "r0"] == [0, 5]
     assert summary.inputs["r0"].skipped == 4
     assert summary.inputs["r0"].missing == 0
-    assert rig.out.kinds("r0").count(EventKind.FRAMES_SKIPPED) == 1
+    assert rig.out.kinds("r0").count(EventKind.FRAMES_SKIPPED) == told
 
 
 async def test_gaps_in_the_cameras_count_are_counted() -> None:
