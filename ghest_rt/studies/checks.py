@@ -9,12 +9,12 @@ class Check:
 
     Attributes:
         name: What is claimed, and where the paper claims it.
-        holds: Whether it holds here.
+        holds: Whether it holds here; None where what was played is too short to say.
         evidence: The figures behind the verdict.
         explanation: Why it holds, or why not.
     """
 
     name: str
-    holds: bool
+    holds: bool | None
     evidence: str
     explanation: str

@@ -80,6 +80,20 @@ def test_the_papers_statements_hold_for_its_own_figures_and_fail_for_others() ->
     assert checks([e for e in table(made_up(papers())) if e["movement"] != "SIR"]) == []
 
 
+def test_statements_about_whole_movements_are_not_judged_on_their_first_seconds() -> None:
+    entries = table(made_up(papers()))
+    assert [check.holds for check in checks(entries, 2.0)] == [None, None, None]
+    assert "Not judged: only the first 2 s of each movement was played" in checks(entries, 2.0)[0].explanation
+    assert [check.holds for check in checks(entries, 31.0)] == [True, True, True]
+
+
+def test_the_figures_behind_a_statement_are_named_in_words() -> None:
+    m1_and_arm = checks(table(made_up(papers())))[1]
+    assert m1_and_arm.evidence.startswith("marker m1: SAbAd 1.76 mm, ")
+    assert "position of the arm: SAbAd 1.1 mm" in m1_and_arm.evidence
+    assert "_" not in m1_and_arm.evidence
+
+
 def test_a_method_that_never_saw_the_marker_leaves_a_gap_in_table_and_figure() -> None:
     rows = made_up(papers(), seeds=1)
     for row in rows[:4]:

@@ -12,8 +12,10 @@ from ghest_rt.cli.main import app
 from ghest_rt.errors import BadInputError
 from ghest_rt.studies.figures.style import Drawn, new_figure
 from ghest_rt.studies.numbers import number
+from ghest_rt.studies.report.accuracy_section import accuracy_section
 from ghest_rt.studies.report.write import write_report
 from ghest_rt.studies.results import write_study
+from ghest_rt.studies.session.errors import POSE_QUANTITIES
 
 
 class Page(HTMLParser):
@@ -89,9 +91,39 @@ def test_computing_times_come_from_the_clock(page: str) -> None:
 
 
 def test_what_does_not_hold_is_said(page: str) -> None:
-    assert "does not" in Page(page).texts
+    assert "does not hold" in Page(page).texts
     assert "COMB is <worst>" in Page(page).texts
     assert "<worst>" not in page  # escaped
+
+
+def test_the_least_error_of_a_row_is_marked_whoever_has_it() -> None:
+    entries = [
+        {"movement": "SFE", "quantity": q, "sensor": "paper", "method": m, "rms": rms, "rms_low": None, "rms_high": None}
+        | {"paper_rms": None, "valid_fraction": 1.0}
+        for q in POSE_QUANTITIES
+        for m, rms in (("paper", 0.9), ("refined", 0.00501), ("fused", 0.00502), ("never", None))
+    ]
+    summary = {"table": entries, "duration_s": None, "seeds": [1], "figures": []}
+    (row,) = accuracy_section(summary, Path()).tables[1].rows
+    assert [cell.kind for cell in row[1:9]] == [*["number", "best", "number", "number"], *["number", "best", "best", "number"]]
+    assert [cell.text for cell in row[5:9]] == ["0.900", "0.0050", "0.0050", "–"]
+
+
+def test_the_first_tile_names_the_methods_of_our_own_that_fused_does_not_beat(page: str) -> None:
+    assert "Against the other methods here: the paper" in page
+    assert "refined" in page.partition("Against the other methods here: ")[2].partition("</small>")[0]
+
+
+def test_a_statement_that_could_not_be_judged_neither_holds_nor_fails(results: Path, tmp_path: Path) -> None:
+    shutil.copytree(results / "accuracy", tmp_path / "accuracy")
+    path = tmp_path / "accuracy" / "summary.json"
+    summary = json.loads(path.read_text())
+    summary["checks"][0]["holds"] = None
+    path.write_text(json.dumps(summary))
+    write_report(tmp_path, tmp_path / "report.html")
+    texts = Page((tmp_path / "report.html").read_text(encoding="utf-8")).texts
+    assert "not judged" in texts
+    assert "does not hold" not in texts
 
 
 def test_the_same_results_give_the_same_page(results: Path, page: str, tmp_path: Path) -> None:

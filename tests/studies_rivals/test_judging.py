@@ -107,7 +107,7 @@ def test_a_row_is_won_only_in_the_rotation_and_in_every_angle() -> None:
     narrow = verdict(who, {**WORSE, "abduction_deg": 0.01}, FUSED, 20.0, 0.01)
     assert not narrow.fused_wins
     assert narrow.lost_in == ("abduction_deg",)
-    assert "abduction 0.050 deg against 0.010 deg" in narrow.verdict
+    assert "abduction 0.050° against 0.010°" in narrow.verdict
 
 
 def test_an_answer_that_is_better_but_late_is_called_so() -> None:
@@ -115,7 +115,7 @@ def test_an_answer_that_is_better_but_late_is_called_so() -> None:
     assert not said.fused_wins
     assert said.fused_wins_when_published
     assert "45 ms after its instant" in said.verdict
-    assert "3.00 deg" in said.verdict
+    assert "3.00°" in said.verdict
 
 
 def test_a_row_that_is_lost_names_what_the_other_has_on_its_side() -> None:
@@ -124,7 +124,7 @@ def test_a_row_that_is_lost_names_what_the_other_has_on_its_side() -> None:
     assert not said.fused_wins
     assert not said.fused_wins_when_published
     assert who.strength in said.verdict
-    assert "off by 0.200 deg" in said.verdict
+    assert "off by 0.200°" in said.verdict
     assert "does not reach" not in said.verdict
     assert "does not reach" in verdict(who, BETTER, FUSED, 15.0, 0.05).verdict
 

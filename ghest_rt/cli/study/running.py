@@ -82,7 +82,7 @@ def new_table(title: str, texts: Sequence[str], numbers: Sequence[str]) -> Table
 def show_checks(document: Mapping[str, Any], console: Console) -> None:
     """Print the paper's statements with their verdicts, and what the study cost."""
     for check in document["checks"]:
-        verdict = "[green]holds[/]" if check["holds"] else "[yellow]does not hold[/]"
+        verdict = {True: "[green]holds[/]", False: "[yellow]does not hold[/]"}.get(check["holds"], "[dim]not judged[/]")
         console.print(f"{verdict}: ", end="")
         console.print(check["name"], markup=False, highlight=False)
         console.print(f"  {check['evidence']}", markup=False, highlight=False, style="dim")

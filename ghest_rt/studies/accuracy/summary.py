@@ -1,20 +1,27 @@
 """Tables 5 and 6 from an accuracy study's rows: means over seeds with confidence intervals, the paper's values beside."""
 
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any, cast
 
 import numpy as np
 
 from ghest_rt.geometry.so3 import Array
+from ghest_rt.simulation.therapy import find_movement
 from ghest_rt.studies.accuracy.study import AccuracyPlan, Row, select
 from ghest_rt.studies.checks import Check
 from ghest_rt.studies.movements import MEAN_OF_MOVEMENTS
-from ghest_rt.studies.numbers import finite
+from ghest_rt.studies.numbers import finite, span_in_words
 from ghest_rt.studies.paper_values import ACCURACY, MEAN, MOVEMENTS
 from ghest_rt.studies.session.errors import POSE_QUANTITIES
 
 _CONFIDENCE = 0.95
+_WORDS = {
+    "m0_m": "marker m0",
+    "m1_m": "marker m1",
+    "position_m": "position of the arm",
+    "orientation_deg": "orientation of the arm",
+}
 
 
 def summarise(plan: AccuracyPlan, rows: Sequence[Row], cpu_s: float) -> dict[str, Any]:
@@ -26,7 +33,7 @@ def summarise(plan: AccuracyPlan, rows: Sequence[Row], cpu_s: float) -> dict[str
         "duration_s": plan.movements.duration_s,
         "cpu_s": cpu_s,
         "table": entries,
-        "checks": [asdict(check) for check in checks(entries)],
+        "checks": [asdict(check) for check in checks(entries, plan.movements.duration_s)],
     }
 
 
@@ -81,12 +88,19 @@ def confidence_interval(values: Array) -> tuple[float | None, float | None]:
     return finite(values.mean() - half), finite(values.mean() + half)
 
 
-def checks(entries: Sequence[Row]) -> list[Check]:
-    """Put the paper's statements on accuracy to the test, for method `paper` with the paper's sensor and movements."""
+def checks(entries: Sequence[Row], duration_s: float | None = None) -> list[Check]:
+    """Put the paper's statements on accuracy to the test, for method `paper` with the paper's sensor and movements.
+
+    They are of whole movements: where only the first `duration_s` of them were played, nothing is judged.
+    """
     rms = _of_method(entries, "paper")
     if not all((quantity, movement) in rms for quantity in POSE_QUANTITIES for movement in MOVEMENTS):
         return []
-    return [_m1_is_worse(rms, _of_method(entries, "refined")), *_comb_is_worst(rms)]
+    found = [_m1_is_worse(rms, _of_method(entries, "refined")), *_comb_is_worst(rms)]
+    if duration_s is None or all(duration_s >= find_movement(name).duration_s for name in MOVEMENTS):
+        return found
+    played = f"Not judged: only the {span_in_words(duration_s)} was played, and the statement is of whole movements. "
+    return [replace(check, holds=None, explanation=played + check.explanation) for check in found]
 
 
 def _of_method(entries: Sequence[Row], method: str) -> dict[tuple[str, str], float]:
@@ -135,7 +149,7 @@ def _comb_is_worst(rms: dict[tuple[str, str], float]) -> list[Check]:
     for what, (quantities, reason) in reasons.items():
         worst = {quantity: max(MOVEMENTS, key=lambda m, q=quantity: rms[q, m]) for quantity in quantities}  # type: ignore[misc]
         figures = "; ".join(
-            f"{q}: {', '.join(f'{m} {_shown(q, rms[q, m])}' for m in MOVEMENTS)}, worst {worst[q]}" for q in quantities
+            f"{_WORDS[q]}: {', '.join(f'{m} {_shown(q, rms[q, m])}' for m in MOVEMENTS)}, worst {worst[q]}" for q in quantities
         )
         name = f"COMB is the worst movement for {what} (Tables 5 and 6)"
         found.append(Check(name, all(movement == "COMB" for movement in worst.values()), figures, reason))

@@ -92,7 +92,7 @@ def _unforeseen(fused_deg: float, simple_forecast_deg: float) -> str:
 
 
 def _deg(value: float) -> str:
-    return "no answer" if math.isnan(value) else f"{number(value)} deg"
+    return "no answer" if math.isnan(value) else f"{number(value)}°"
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any
 
 from ghest_rt.studies.numbers import number, percent, span_in_words
-from ghest_rt.studies.report.page import Cell, Section, Statement, Table, figures_of
+from ghest_rt.studies.report.page import BEST, Cell, Section, Statement, Table, errors_compared, figures_of
 
 Row = dict[str, Any]
 
@@ -59,7 +59,8 @@ def _table(entries: list[Row], sensor: str, title: str, quantities: tuple[tuple[
             found = {e["method"]: e for e in here if (e["movement"], e["quantity"]) == (movement, quantity)}
             if published:
                 cells.append(Cell(number(next(iter(found.values()))["paper_rms"], scale), "published"))
-            cells += [Cell(_with_interval(found[m], scale), "ours" if m == "fused" else "number") for m in methods]
+            errors = [found[m]["rms"] if found[m]["rms"] is None else scale * found[m]["rms"] for m in methods]
+            cells += errors_compared(errors, [_with_interval(found[m], scale) for m in methods])
         rows.append(tuple(cells))
         valid = {e["method"]: e["valid_fraction"] for e in here if e["movement"] == movement}
         rows[-1] += (Cell(", ".join(percent(valid[m]) for m in methods)),)
@@ -69,6 +70,7 @@ def _table(entries: list[Row], sensor: str, title: str, quantities: tuple[tuple[
         head=("movement", *columns * len(quantities), ", ".join(methods)),
         rows=tuple(rows),
         groups=(("", 1), *((name, len(columns)) for _, name, _ in quantities), ("valid (%)", 1)),
+        note=f"{BEST} of the methods here, each judged at the instant that its answer holds for.",
     )
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 from ghest_rt.studies.compare.verdicts import tally
 from ghest_rt.studies.numbers import number, percent, span_in_words
-from ghest_rt.studies.report.page import Cell, Section, Statement, Table, figures_of
+from ghest_rt.studies.report.page import BEST, Cell, Section, Statement, Table, errors_compared, figures_of
 
 Row = dict[str, Any]
 
@@ -63,14 +63,16 @@ def _note(who: Row, summary: Row) -> str:
 
 def _table(summary: Row, sensor: str, kind: str) -> Table:
     rows: list[tuple[Cell, ...]] = []
-    for who in summary["contenders"]:
-        measured = next(g for g in who["measured"] if (g["sensor"], g["kind"]) == (sensor, kind))
-        style = "ours" if who["key"] == "fused" else "number"
+    all_measured = [
+        next(g for g in who["measured"] if (g["sensor"], g["kind"]) == (sensor, kind)) for who in summary["contenders"]
+    ]
+    columns = [_column([measured[name] for measured in all_measured]) for name, _ in _COLUMNS]
+    for k, (who, measured) in enumerate(zip(summary["contenders"], all_measured, strict=True)):
         won = tally(summary["verdicts"], who["key"], sensor, kind)
         rows.append(
             (
                 Cell(who["title"], ""),
-                *(Cell(number(measured[name]), style) for name, _ in _COLUMNS),
+                *(column[k] for column in columns),
                 Cell(percent(measured["answered_fraction"])),
                 Cell(f"{won.own_instant} of {won.rows}" if won.rows else ""),
                 Cell(f"{won.published} of {won.rows}" if won.rows else ""),
@@ -93,8 +95,9 @@ def _table(summary: Row, sensor: str, kind: str) -> Table:
         ),
         rows=tuple(rows),
         note=(
-            f"The scapula turned by (RMS against the neutral posture, unseen by any encoder): {turned}. How much there is to "
-            f"foresee: keeping the exact truth of one image ago is off by {held}; continuing it straight by {straight} (RMS)."
+            f"{BEST} of each column. The scapula turned by (RMS against the neutral posture, unseen by any encoder): {turned}. "
+            f"How much there is to foresee: keeping the exact truth of one image ago is off by {held}; continuing it straight "
+            f"by {straight} (RMS)."
         ),
     )
 
@@ -110,22 +113,30 @@ def _movements(summary: Row, sensor: str, kind: str, column: str) -> dict[str, f
 
 def _by_movement(summary: Row, sensor: str) -> Table:
     movements = list(dict.fromkeys(row["movement"] for row in summary["rows"] if row["sensor"] == sensor))
-    rows: list[tuple[Cell, ...]] = []
-    for who in summary["contenders"]:
-        style = "ours" if who["key"] == "fused" else "number"
-        mine = [row for row in summary["rows"] if (row["sensor"], row["contender"]) == (sensor, who["key"])]
-        cells = [Cell(who["title"], "")]
-        for movement in movements:
-            values = [
-                row["orientation_deg"] for row in mine if row["movement"] == movement and row["orientation_deg"] is not None
-            ]
-            cells.append(Cell(number(sum(values) / len(values) if values else None), style))
-        rows.append(tuple(cells))
+    columns = [
+        _column([_mean_of(summary, sensor, who["key"], movement) for who in summary["contenders"]]) for movement in movements
+    ]
+    rows = [(Cell(who["title"], ""), *(column[k] for column in columns)) for k, who in enumerate(summary["contenders"])]
     return Table(
         title=f"GH rotation by movement, sensor {sensor}: errors (°)",
         head=("contender", *movements),
         rows=tuple(rows),
+        note=f"{BEST} of each column.",
     )
+
+
+def _mean_of(summary: Row, sensor: str, contender: str, movement: str) -> float | None:
+    values = [
+        row["orientation_deg"]
+        for row in summary["rows"]
+        if (row["sensor"], row["contender"], row["movement"]) == (sensor, contender, movement)
+        and row["orientation_deg"] is not None
+    ]
+    return fmean(values) if values else None
+
+
+def _column(values: list[float | None]) -> list[Cell]:
+    return errors_compared(values, [number(value) for value in values])
 
 
 def _statements(summary: Row) -> tuple[Statement, ...]:

@@ -1,6 +1,6 @@
 """The figures that the report begins with."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any
 
 from ghest_rt.studies.movements import MEAN_OF_MOVEMENTS
@@ -72,13 +72,17 @@ def _latency(summary: Row) -> list[KeyFigure]:
 
 
 def _compare(summary: Row) -> list[KeyFigure]:
-    others = {who["key"] for who in summary["contenders"] if not who["ours"]}
-    rows = [verdict for verdict in summary["verdicts"] if verdict["contender"] in others]
-    won = sum(verdict["fused_wins"] for verdict in rows)
+    def won(keys: Collection[str]) -> str:
+        rows = [verdict for verdict in summary["verdicts"] if verdict["contender"] in keys]
+        return f"{sum(verdict['fused_wins'] for verdict in rows)} of {len(rows)}"
+
+    contenders = summary["contenders"]
+    own = [f"{who['title']} {won([who['key']])}" for who in contenders if who["ours"] and who["key"] != "fused"]
+    beside = "in the rotation and in every single angle; what is not won is explained"
     return [
         KeyFigure(
-            f"{won} of {len(rows)}",
-            "rows against the rivals won by fused",
-            "in the rotation and in every single angle; what is not won is explained",
+            won([who["key"] for who in contenders if not who["ours"]]),
+            "rows against other ways won by fused",
+            beside + (f". Against the other methods here: {', '.join(own)}" if own else ""),
         )
     ]

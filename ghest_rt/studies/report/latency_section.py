@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any
 
 from ghest_rt.studies.numbers import number
-from ghest_rt.studies.report.page import Cell, Section, Table, figures_of
+from ghest_rt.studies.report.page import BEST, Cell, Section, Table, errors_compared, figures_of
 
 Row = dict[str, Any]
 
@@ -31,9 +31,15 @@ def latency_section(summary: Row, folder: Path) -> Section:
 
 
 def _candidates(summary: Row) -> Table:
+    behind, errors = (
+        _compared([who[name] for who in summary["candidates"]]) for name in ("effective_delay_ms", "published_deg")
+    )
     return Table(
         title="Answers when they are published",
-        note="Computing: median on the machine that ran the study; it adds to the age of the image.",
+        note=(
+            "Computing: median on the machine that ran the study; it adds to the age of the image. "
+            "In bold green: the least delay and the least error."
+        ),
         head=(
             "method",
             "lag (ms)",
@@ -48,10 +54,10 @@ def _candidates(summary: Row) -> Table:
                 Cell(f"{who['lag_ms']:.0f}"),
                 Cell(number(max(who["age_ms"][camera] or 0.0 for camera in ("r0", "r1")))),
                 Cell(f"{number(who['vision_ms'])}, {number(who['answer_ms'])}"),
-                Cell(number(who["effective_delay_ms"]), _kind(who["key"])),
-                Cell(number(who["published_deg"]), _kind(who["key"])),
+                behind[k],
+                errors[k],
             )
-            for who in summary["candidates"]
+            for k, who in enumerate(summary["candidates"])
         ),
     )
 
@@ -66,15 +72,16 @@ def _speeds(summary: Row) -> Table:
                 Cell(movement, ""),
                 Cell(f"×{speed:g}"),
                 Cell(number(there["fused"]["rms_speed_dps"])),
-                *(Cell(number(there[key]["published_deg"]), _kind(key)) for key in keys),
+                *_compared([there[key]["published_deg"] for key in keys]),
             )
         )
     return Table(
         title=f"Error when published (° RMS), sensor {summary['settings']['sensor']}",
         head=("movement", "speed", "GH joint (°/s RMS)", *keys.values()),
         rows=tuple(rows),
+        note=f"{BEST} of each row.",
     )
 
 
-def _kind(key: str) -> str:
-    return "ours" if key == "fused" else "number"
+def _compared(values: list[float | None]) -> list[Cell]:
+    return errors_compared(values, [number(value) for value in values])

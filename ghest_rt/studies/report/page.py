@@ -1,12 +1,13 @@
 """What the report's page consists of, before it becomes HTML."""
 
 import base64
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from ghest_rt.errors import BadInputError
+from ghest_rt.studies.numbers import number
 from ghest_rt.studies.results import FIGURES
 
 
@@ -16,12 +17,28 @@ class Cell:
 
     Attributes:
         text: What it says.
-        kind: "" for text, "number", "published" for the paper's or a rival's own figure, "ours" for method `fused`,
-            "behind" for method `fused` where another one does better.
+        kind: "" for text, "number", "published" for the paper's or a rival's own figure, "best" for the least of those
+            compared, "behind" for method `fused` where another one does better.
     """
 
     text: str
     kind: str = "number"
+
+
+BEST = "In bold green: the least error"
+"""What the colour of `best` cells means; say of what."""
+
+
+def errors_compared(values: Sequence[float | None], texts: Sequence[str]) -> list[Cell]:
+    """Return the cells of errors that are compared with each other; the least are marked, all that look alike."""
+    known = [value for value in values if value is not None]
+    if len(known) < 2:
+        return [Cell(text) for text in texts]
+    least = number(min(known))
+    return [
+        Cell(text, "best" if value is not None and number(value) == least else "number")
+        for value, text in zip(values, texts, strict=True)
+    ]
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,13 +81,13 @@ class Statement:
 
     Attributes:
         text: The statement.
-        holds: Whether it holds.
+        holds: Whether it holds; None where that could not be judged.
         evidence: The figures behind the verdict; every line a paragraph.
         explanation: Why.
     """
 
     text: str
-    holds: bool
+    holds: bool | None
     evidence: str = ""
     explanation: str = ""
 
@@ -114,7 +131,7 @@ class Section:
     figures: tuple[Figure, ...] = ()
     statements_title: str = "Statements put to the test"
     statements: tuple[Statement, ...] = ()
-    badges: tuple[str, str] = ("holds", "does not")
+    badges: tuple[str, str] = ("holds", "does not hold")
     notes: tuple[tuple[str, str], ...] = ()
     missing: bool = False
 

@@ -5,12 +5,14 @@ from typing import Any
 
 from ghest_rt.studies.numbers import number, span_in_words
 from ghest_rt.studies.report.accuracy_section import statements_of
-from ghest_rt.studies.report.page import Cell, Section, Table, figures_of
+from ghest_rt.studies.report.page import BEST, Cell, Section, Table, errors_compared, figures_of
 
 Row = dict[str, Any]
 
 _MUCH = 1.1
 """Figures that differ by less count as alike."""
+
+_BEHIND = "In orange: fused is further off than another one, by more than a tenth."
 
 
 def sensitivity_section(summary: Row, folder: Path) -> Section:
@@ -45,6 +47,9 @@ def sensitivity_section(summary: Row, folder: Path) -> Section:
 
 def _mean_table(summary: Row) -> Table:
     undisturbed = {row["method"]: row for row in summary["undisturbed"]}
+    means = summary["mean_at_largest_shift"]
+    still = _compared([undisturbed[row["method"]]["orientation_deg_rms"] for row in means])
+    displaced = _compared([row["orientation_deg"] for row in means])
     paper_deg = summary["paper"]["mean_orientation_deg_at_20_mm"]
     return Table(
         title="Mean over movements and q1 to q6",
@@ -52,14 +57,19 @@ def _mean_table(summary: Row) -> Table:
         rows=tuple(
             (
                 Cell(row["method"], ""),
-                Cell(number(undisturbed[row["method"]]["orientation_deg_rms"])),
-                Cell(number(row["orientation_deg"]), "ours" if row["method"] == "fused" else "number"),
+                still[k],
+                displaced[k],
                 Cell(number(row["amount_m"], 1e3)),
                 Cell(number(paper_deg) if row["method"] == "paper" else "", "published"),
             )
-            for row in summary["mean_at_largest_shift"]
+            for k, row in enumerate(means)
         ),
+        note=f"{BEST} of the methods.",
     )
+
+
+def _compared(values: list[float | None]) -> list[Cell]:
+    return errors_compared(values, [number(value) for value in values])
 
 
 def _shift_table(shifts: list[Row]) -> Table:
@@ -83,7 +93,7 @@ def _shift_table(shifts: list[Row]) -> Table:
         rows=tuple(rows),
         groups=(("", 1), *((method, 4) for method in methods)),
         note=(
-            "In orange: fused is further off than another method. Its S is large and negative where it notices a displacement "
+            f"{BEST} of the methods. {_BEHIND} Its S is large and negative where it notices a displacement "
             "only as it grows: the error shrinks there."
         ),
     )
@@ -107,13 +117,16 @@ def _further_table(further: list[Row]) -> Table:
         title="Beyond the paper: orientation error of the arm (°), mean over movements",
         head=("disturbance", "amount", *methods),
         rows=tuple(rows),
-        note="In orange: fused is further off than another method.",
+        note=f"{BEST} of the methods. {_BEHIND}",
     )
 
 
 def _kind(of: dict[str, Row], method: str, column: str) -> str:
     """Return how a method's figure is to look among those of all methods."""
-    if method != "fused":
-        return "number"
     known = [row[column] for row in of.values() if row[column] is not None]
-    return "ours" if of[method][column] is None or of[method][column] <= _MUCH * min(known) else "behind"
+    value = of[method][column]
+    if value is None or len(known) < 2:
+        return "number"
+    if number(value) == number(min(known)):
+        return "best"
+    return "behind" if method == "fused" and value > _MUCH * min(known) else "number"
