@@ -31,7 +31,7 @@ class RunReport:
         rate_hz: Samples per second of their own time, after the start.
         missed_ticks: Grid slots skipped; None without a clock.
         lateness: Of the ticks; None without a clock.
-        skipped_frames: Frames passed over because vision was slower than the cameras; None without a clock.
+        skipped_frames: Frames passed over because they were too old when their turn came; None without a clock.
         judged: Samples compared with the truth.
         orientation_rmse_deg: Against the truth; None without.
         position_rmse_mm: Against the truth; None without.
@@ -130,7 +130,7 @@ def print_reports(
     for report in reports:
         if report.skipped_frames:
             frames = "1 frame" if report.skipped_frames == 1 else f"{report.skipped_frames} frames"
-            console.print(f"{report.source}: {frames} skipped, vision was slower than the cameras")
+            console.print(f"{report.source}: {frames} skipped, too old when their turn came")
         if report.degraded_fraction:
             console.print(f"{report.source}: {100.0 * report.degraded_fraction:.2f} % degraded, with angles")
         if report.unused:

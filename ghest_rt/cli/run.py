@@ -124,6 +124,8 @@ def run_station(options: RunOptions) -> None:
             summary = run_service(service, stop, options.duration_s)
     counts = recording.counts() if recording is not None else None
     print_reports(Console(), [report_of(config.station.id, method, summary, scoreboard)], options.as_json, counts)
+    if world is not None and world.slowness and not options.as_json:
+        Console().print(f"{config.station.id}: {world.slowness}", highlight=False)
     if counts is not None and counts.failure:
         raise GhestError(f"the recording is not complete: {counts.failure}")
     if options.duration_s is not None and world is None and not stop.is_set():

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 from ghest_rt.cli.scoreboard import Scoreboard
+from ghest_rt.cli.sim_pace import PacedWorld
 from ghest_rt.cli.simulated_station import checked_station
 from ghest_rt.config.load import LoadedStation
 from ghest_rt.messages.published import Event, GhAngles, Health
@@ -30,6 +31,7 @@ class LiveWorld:
         if options.station is not None and checked_station(options.station).config.joint.name == KNEE:
             options = replace(options, movement=None)  # a knee has one of its own
         self._world: StagedWorld = stage_world(options)
+        self._paced = PacedWorld(self._world)
         self._start_ns = start_ns
         self.scoreboard = Scoreboard()
         self.scoreboard.set_time_axis(self.to_world_ns)
@@ -42,7 +44,12 @@ class LiveWorld:
     @property
     def device_settings(self) -> dict[str, object]:
         """What simulated devices are made with."""
-        return {"world": self._world, "start_ns": self._start_ns}
+        return {"world": self._paced, "start_ns": self._start_ns}
+
+    @property
+    def slowness(self) -> str:
+        """That rendering does not keep up with the clock, in words; "" if it does."""
+        return self._paced.slowness
 
     def to_world_ns(self, t_ns: int) -> int:
         """Return the world's time of an instant of the service's clock."""

@@ -141,7 +141,7 @@ class CameraWorker:
             self._post(self._listener.observed, observation)
 
     def _newest_useful(self, frame: RgbdFrame) -> RgbdFrame:
-        """Pass over frames that have waited too long while a newer one is there: vision is slower than the camera.
+        """Pass over frames that have waited too long while a newer one is there: vision is slow, or the camera late.
 
         Only what waited when it began is passed over: whatever comes meanwhile is the newest there can be, even if it is old,
         since a camera on a machine that is too busy delivers nothing else.
@@ -159,7 +159,11 @@ class CameraWorker:
             self.counters.skipped += 1
             if not self._skips_told and t_begin_ns - self._first_ns >= self._settings.settled_after_ns:
                 self._skips_told = True
-                self._event(EventKind.FRAMES_SKIPPED, "warning", "vision is slower than the camera: old frames are passed over")
+                self._event(
+                    EventKind.FRAMES_SKIPPED,
+                    "warning",
+                    "frames wait too long for vision, or come too late: old ones are passed over",
+                )
             frame = newer
         return frame
 

@@ -40,8 +40,8 @@ def make_detector(
     if method == "paper":
         if color_only:
             raise BadInputError(
-                f"cameras.{camera_name}.depth is false, and method paper cannot work from colour alone: eq. (3) reads every disk's "
-                "position from depth; choose another method (estimator.method, --method)"
+                f"cameras.{camera_name}.depth is false, and method paper cannot work from colour alone: eq. (3) reads every "
+                "disk's position from depth; choose another method (estimator.method, --method)"
             )
         return PaperDetector(camera_name, marker_name, marker, info)
     raise BadInputError(f"no vision method {method!r}; choose one of paper, refined, aruco, photometric")
