@@ -175,6 +175,12 @@ def test_an_empty_folder_is_refused(tmp_path: Path) -> None:
         write_report(tmp_path, tmp_path / "report.html")
 
 
+def test_another_ending_is_refused(results: Path, tmp_path: Path) -> None:
+    with pytest.raises(BadInputError, match=r"r.pdf: the report is an HTML page; name a file that ends in .html"):
+        write_report(results, tmp_path / "r.pdf")
+    assert not list(tmp_path.iterdir())
+
+
 @pytest.mark.parametrize("content", ["{", "[1]", '{"candidates": []}'])
 def test_a_damaged_summary_is_named_with_the_remedy(tmp_path: Path, content: str) -> None:
     (tmp_path / "latency").mkdir()

@@ -25,11 +25,12 @@ def opened(out: Path, workers: int | None, scheduler: str | None) -> tuple[Resul
     That is a Dask cluster if its scheduler is named, otherwise this machine's cores.
 
     Raises:
-        BadInputError: The folder cannot be written to.
+        BadInputError: The folder cannot be written to, or the scheduler's address is none.
     """
+    executor = LocalExecutor(workers) if scheduler is None else ClusterExecutor(scheduler)
     store = ResultStore(out / "tasks")
     store.prepare()
-    return store, LocalExecutor(workers) if scheduler is None else ClusterExecutor(scheduler)
+    return store, executor
 
 
 @contextmanager

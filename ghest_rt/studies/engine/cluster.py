@@ -29,15 +29,22 @@ class ClusterExecutor:
     connect_s: float = 10.0
     worker_s: float = 60.0
 
+    def __post_init__(self) -> None:
+        """Check the address, whether there will be anything to run or not.
+
+        Raises:
+            BadInputError: It is none.
+        """
+        _check(self.address)
+
     def run(self, jobs: Sequence[Job], store: ResultStore) -> Iterator[Outcome]:
         """Yield what became of each job as it ends.
 
         Raises:
-            BadInputError: The address is none, no scheduler answers there, or it has no worker.
+            BadInputError: No scheduler answers at the address, or it has no worker.
             GhestError: Dask is not installed.
         """
         dask = _distributed()
-        _check(self.address)
         try:
             client = dask.Client(self.address, timeout=self.connect_s, set_as_default=False)
         except (OSError, ValueError) as error:

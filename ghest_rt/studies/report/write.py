@@ -39,9 +39,11 @@ def write_report(folder: Path, out: Path) -> list[str]:
         out: The HTML file.
 
     Raises:
-        BadInputError: The folder holds no study, or a damaged one.
+        BadInputError: The folder holds no study, or a damaged one, or `out` has another ending than a page's.
         GhestError: Jinja2 is not installed, or the file cannot be written.
     """
+    if out.suffix.lower() not in {".html", ".htm"}:
+        raise BadInputError(f"--out {out}: the report is an HTML page; name a file that ends in .html")
     need_extra("study", "the report")
     from jinja2 import Environment, FileSystemLoader, StrictUndefined  # noqa: PLC0415 - an extra, imported only when used
 
