@@ -32,7 +32,8 @@ def ten_thousand(way: str) -> str:
         router.__exit__(None, None, None)
     seqs = heard["seqs"]
     missing = seqs[-1] - seqs[0] + 1 - len(seqs)
-    return f"{len(seqs)} received, {missing} missing, {heard['recovered']} of them asked for again"
+    before = f"{seqs[0]} published before the connection stood" if seqs[0] else "from the first one on"
+    return f"{len(seqs)} received, {missing} missing, {heard['recovered']} of them asked for again; {before}"
 
 
 def recovery(
