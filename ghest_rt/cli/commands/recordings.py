@@ -44,12 +44,13 @@ def simulate(
     sensor: Annotated[
         Sensor, typer.Option(help="paper: the paper's ideal sensor; sr300: 640x480 with the real one's faults")
     ] = (Sensor.PAPER),
-    seed: Annotated[int, typer.Option(metavar="N", help="The same seed gives the same bytes")] = 0,
+    seed: Annotated[int, typer.Option(metavar="N", help="The same seed gives the same bytes; from 0")] = 0,
     duration_s: Annotated[
-        float | None, typer.Option("--duration", metavar="SECONDS", help="Only the first seconds", show_default=False)
+        float | None,
+        typer.Option("--duration", metavar="SECONDS", help="Only the first seconds; more than 0", show_default=False),
     ] = None,
     arm: Annotated[Side, typer.Option(help="The patient's arm in the exoskeleton")] = Side.RIGHT,
-    height_m: Annotated[float, typer.Option("--height", metavar="METRES", help="The patient's height")] = 1.75,
+    height_m: Annotated[float, typer.Option("--height", metavar="METRES", help="The patient's height, 1.4 to 2.1")] = 1.75,
     marker: Annotated[MarkerTexture, typer.Option(help="What is printed on the marker plates")] = MarkerTexture.DISKS,
     station: Annotated[
         Path | None,
@@ -69,7 +70,12 @@ def simulate(
     ] = False,
     as_json: Json = False,
 ) -> None:
-    """Record a simulated patient in the exoskeleton, with the true angles (needs the extra 'sim')."""
+    """Record a simulated patient in the exoskeleton, with the true angles (needs the extra 'sim').
+
+    Say what the patient does by --movement or --motion; only the simulated knee has one movement of its own.
+
+    Example: [bold]ghest-rt simulate --movement COMB --sensor sr300 --seed 1 --duration 4 --out rec.mcap[/]
+    """
     from ghest_rt.extras import need_extra
 
     need_extra("sim", "a simulated patient")
@@ -111,7 +117,10 @@ def estimate(
     station: OtherStation = None,
     as_json: Json = False,
 ) -> None:
-    """Turn a recording into a table of angles, off line, as fast as the machine allows."""
+    """Turn a recording into a table of angles, off line, as fast as the machine allows.
+
+    Its columns: docs/recording-format.md, "The table of ghest-rt estimate".
+    """
     from ghest_rt.cli.estimate import estimate as estimate_recording
 
     estimate_recording(recording, method, out, station, as_json)
@@ -125,7 +134,10 @@ def score(
     method: MethodOption = None,
     as_json: Json = False,
 ) -> None:
-    """Compare estimates with the truth in simulated recordings: the paper's error metrics."""
+    """Compare estimates with the truth in simulated recordings: the paper's error metrics.
+
+    Example: [bold]ghest-rt score sim_fixtures --method refined[/]
+    """
     from ghest_rt.cli.score import score_paths
 
     score_paths(recordings, method, as_json)

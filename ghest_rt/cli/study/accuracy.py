@@ -1,19 +1,18 @@
 """`ghest-rt study accuracy`: Tables 5 and 6 and Figure 13."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-from ghest_rt.cli.options import Json
+import typer
+
+from ghest_rt.cli.options import Json, Sensor
 from ghest_rt.cli.study.options import (
     Duration,
     Methods,
     Motions,
     Movements,
     Out,
-    Quick,
     Scheduler,
-    Seeds,
-    Sensors,
     Workers,
     chosen_methods,
     chosen_sensors,
@@ -29,18 +28,44 @@ _TITLES = {"m0_m": "m0\nmm", "m1_m": "m1\nmm", "position_m": "arm\nmm", "orienta
 
 def accuracy(
     out: Out = Path("out/study"),
-    sensor: Sensors = None,
+    sensor: Annotated[
+        list[Sensor] | None,
+        typer.Option(
+            "--sensor",
+            help="Which sensor; again for more. By default both, with --quick the paper's",
+            show_default=False,
+        ),
+    ] = None,
     method: Methods = None,
     movement: Movements = None,
     motion: Motions = None,
-    seeds: Seeds = None,
+    seeds: Annotated[
+        int | None,
+        typer.Option(
+            "--seeds",
+            min=1,
+            metavar="N",
+            help="Repeat with so many seeds. By default 3, for confidence intervals, with --quick 2",
+            show_default=False,
+        ),
+    ] = None,
     duration: Duration = None,
-    quick: Quick = False,
+    quick: Annotated[
+        bool,
+        typer.Option(
+            "--quick",
+            metavar="",
+            help="A small version, to see that it works: 2 s of each movement, one sensor, two seeds; what is named counts",
+        ),
+    ] = False,
     workers: Workers = None,
     scheduler: Scheduler = None,
     as_json: Json = False,
 ) -> None:
-    """Errors of the markers' and the arm's pose per movement: Tables 5 and 6, Figure 13."""
+    """Errors of the markers' and the arm's pose per movement: Tables 5 and 6, Figure 13.
+
+    Example: [bold]ghest-rt study accuracy --sensor paper --seeds 1[/]
+    """
     from ghest_rt.cli.study.running import finish, opened, shown_progress
 
     need_extra("study", "a study")

@@ -1,7 +1,9 @@
 """`ghest-rt study compare`: Table 7 made real."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
 
 from ghest_rt.cli.options import Json
 from ghest_rt.cli.study.options import (
@@ -9,7 +11,6 @@ from ghest_rt.cli.study.options import (
     Motions,
     Movements,
     Out,
-    Quick,
     Scheduler,
     Seeds,
     Sensors,
@@ -38,7 +39,10 @@ def compare(
     motion: Motions = None,
     seeds: Seeds = None,
     duration: Duration = None,
-    quick: Quick = False,
+    quick: Annotated[
+        bool,
+        typer.Option("--quick", metavar="", help="A small version, to see that it works: 1.5 s of COMB; what is named counts"),
+    ] = False,
     workers: Workers = None,
     scheduler: Scheduler = None,
     as_json: Json = False,

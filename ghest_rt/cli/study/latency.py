@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ghest_rt.cli.options import Json, Sensor
-from ghest_rt.cli.study.options import Motions, Movements, Out, Quick, Scheduler, Seed, Workers, movements_of
+from ghest_rt.cli.study.options import Motions, Movements, Out, Scheduler, Seed, Workers, movements_of
 from ghest_rt.extras import need_extra
 
 if TYPE_CHECKING:
@@ -38,7 +38,14 @@ def latency(
             show_default=False,
         ),
     ] = None,
-    quick: Quick = False,
+    quick: Annotated[
+        bool,
+        typer.Option(
+            "--quick",
+            metavar="",
+            help="A small version, to see that it works: 1.2 s of COMB at two speeds; what is named counts",
+        ),
+    ] = False,
     workers: Workers = None,
     scheduler: Scheduler = None,
     as_json: Json = False,

@@ -41,7 +41,7 @@ Sensors = Annotated[
     list[Sensor] | None,
     typer.Option(
         "--sensor",
-        help="Which sensor; again for more. By default the paper's; `accuracy` without --quick has both",
+        help="Which sensor; again for more. By default the paper's",
         show_default=False,
     ),
 ]
@@ -51,7 +51,7 @@ Seeds = Annotated[
         "--seeds",
         min=1,
         metavar="N",
-        help="Repeat with so many seeds. By default 1; `accuracy` has 3, for confidence intervals, with --quick 2",
+        help="Repeat with so many seeds. By default 1",
         show_default=False,
     ),
 ]
@@ -77,9 +77,6 @@ Scheduler = Annotated[
 Duration = Annotated[
     float | None,
     typer.Option("--duration", min=0.1, metavar="SECONDS", help="Only the first seconds of every movement", show_default=False),
-]
-Quick = Annotated[
-    bool, typer.Option("--quick", metavar="", help="A small version of the study, to see that it works; what is named counts")
 ]
 
 

@@ -12,7 +12,6 @@ from ghest_rt.cli.study.options import (
     Motions,
     Movements,
     Out,
-    Quick,
     Scheduler,
     Seed,
     Workers,
@@ -50,7 +49,14 @@ def sensitivity(
             show_default=False,
         ),
     ] = None,
-    quick: Quick = False,
+    quick: Annotated[
+        bool,
+        typer.Option(
+            "--quick",
+            metavar="",
+            help="A small version, to see that it works: 2 s of each movement, fewer amounts; what is named counts",
+        ),
+    ] = False,
     workers: Workers = None,
     scheduler: Scheduler = None,
     as_json: Json = False,
