@@ -52,11 +52,8 @@ def calibrate(session: Session, station: LoadedStation, options: CalibrationOpti
     """Return the calibration that a session gives, and whether it is to be used.
 
     Raises:
-        BadInputError: The station measures another joint, or an option does not fit the session.
+        BadInputError: An option cannot be used, or does not fit the session.
     """
-    joint = station.config.joint.name
-    if joint != _GH:
-        raise BadInputError(f"{station.source}: joint.name is {joint}: only the shoulder ({_GH}) has a calibration session")
     if not re.fullmatch(r"[A-Za-z0-9_-]{1,64}", options.calibration_id):
         raise BadInputError(f"--id {options.calibration_id}: give up to 64 letters, digits, - and _")
     objections = object_to_view(session)
@@ -73,6 +70,17 @@ def calibrate(session: Session, station: LoadedStation, options: CalibrationOpti
         return Outcome(tuple(objections), None, None)
     objections += object_to_movement(found)
     return Outcome(tuple(objections), found, _calibration(found, old, options.calibration_id))
+
+
+def check_joint(station: LoadedStation) -> None:
+    """Refuse a station that measures anything but the shoulder.
+
+    Raises:
+        BadInputError: It does.
+    """
+    joint = station.config.joint.name
+    if joint != _GH:
+        raise BadInputError(f"{station.source}: joint.name is {joint}: only the shoulder ({_GH}) has a calibration session")
 
 
 def new_station_text(station: LoadedStation, calibration: Calibration, hold: Hold, recording: str) -> str:

@@ -53,6 +53,11 @@ class SharedCentre:
     spread_rad: Array
 
     @property
+    def turning_rad(self) -> float:
+        """How far the bodies turned about other axes than the first: what the centre along that one rests on."""
+        return float(np.hypot(self.spread_rad[1], self.spread_rad[2]))
+
+    @property
     def first_sigma_m(self) -> float:
         """Standard deviation of the first centre in its worst direction."""
         return float(np.sqrt(np.linalg.eigvalsh(self.covariance[:3, :3])[-1]))
@@ -128,5 +133,5 @@ def _sandwich(A: Array, weights: Array, residual: Array, block: NDArray[np.int64
     scores = np.einsum("nki,n,nk->ni", A, weights, residual)
     names = np.unique(block)
     sums = np.array([scores[block == name].sum(axis=0) for name in names])
-    more = len(names) / max(len(names) - 1, 1)
+    more = len(names) / max(len(names) - A.shape[2], 1)  # residuals are smaller than errors, by the six numbers fitted
     return np.asarray(more * bread @ sums.T @ sums @ bread)

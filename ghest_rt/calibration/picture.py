@@ -22,10 +22,8 @@ def draw_calibration(session: Session, found: Found, out: Path) -> None:
     """Draw to a PNG, SVG or PDF file.
 
     Raises:
-        BadInputError: `out` has another ending, or cannot be written.
+        BadInputError: `out` cannot be written.
     """
-    if out.suffix.lower() not in {".png", ".svg", ".pdf"}:
-        raise BadInputError(f"{out}: pictures end in .png, .svg or .pdf")
     figure = Figure(figsize=(10.0, 6.4), layout="constrained")
     grid = figure.add_gridspec(2, 4, height_ratios=(1.0, 0.9))
     over_time = figure.add_subplot(grid[0, :])

@@ -24,6 +24,8 @@ MISALIGNED_M = 0.010
 TAPE_M = 0.005
 """Standard deviation of an arm length measured with a tape."""
 
+_LEAST_TURNING_RAD = math.radians(2.0)
+
 ElbowFrom = Literal["posture", "exoskeleton"]
 
 # The arm frame's axes seen from the elbow frame: z of the arm is y of the elbow frame (docs/frames.md).
@@ -136,12 +138,15 @@ def solve(session: Session, hold: Hold, old: Calibration, elbow_from: ElbowFrom,
 
 
 def _pivot(session: Session, block: NDArray[np.int64]) -> SharedCentre | None:
-    """Return the point shared by the link of camera r1 and m1, if it is known to within `MISALIGNED_M`."""
+    """Return the point shared by the link of camera r1 and m1, if it is known to within `MISALIGNED_M`.
+
+    Noise of the rotations draws the centre towards the marker, the more the less they turn: hence the second condition.
+    """
     try:
         pivot = find_centre(session.e_from_link, session.e_from_m1, block)
     except UnknowableCentreError:
         return None
-    return pivot if pivot.second_sigma_m <= MISALIGNED_M else None
+    return pivot if pivot.second_sigma_m <= MISALIGNED_M and pivot.turning_rad >= _LEAST_TURNING_RAD else None
 
 
 def _length(

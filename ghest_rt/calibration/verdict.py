@@ -17,6 +17,8 @@ LEAST_SEEN_S = 8.0
 """And so many seconds of it."""
 LEAST_RANGE_RAD = math.radians(15.0)
 """Range of flexion, abduction and rotation each."""
+LEAST_TURNING_RAD = math.radians(4.0)
+"""Root mean square turning about other axes than the first."""
 GREATEST_SIGMA_M = 0.003
 """Standard deviation of the GH centre in either marker, worst direction."""
 GREATEST_RESIDUAL_M = 0.006
@@ -113,6 +115,13 @@ def _range(range_rad: Array) -> list[Objection]:
 
 def _centre(found: Found) -> list[Objection]:
     objections = []
+    turning_rad = found.gh.turning_rad
+    if turning_rad < LEAST_TURNING_RAD:
+        text = (
+            f"the arm turned by {math.degrees(turning_rad):.1f}° RMS only about other axes than one, "
+            f"{math.degrees(LEAST_TURNING_RAD):.0f}° are needed: move in all three directions, one after the other"
+        )
+        objections.append(Objection(Refusal.RANGE_TOO_SMALL, text))
     sigma_m = max(found.gh.first_sigma_m, found.gh.second_sigma_m)
     if not sigma_m <= GREATEST_SIGMA_M:
         text = (

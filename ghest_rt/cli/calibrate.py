@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.progress import Progress
 from rich.table import Table
 
-from ghest_rt.calibration.calibrate import CalibrationOptions, Outcome, calibrate, id_from, new_station_text
+from ghest_rt.calibration.calibrate import CalibrationOptions, Outcome, calibrate, check_joint, id_from, new_station_text
 from ghest_rt.calibration.report import notes_of, rows_of
 from ghest_rt.calibration.session import Session, read_session
 from ghest_rt.calibration.solve import ElbowFrom, Found
@@ -19,6 +19,7 @@ from ghest_rt.errors import BadInputError
 from ghest_rt.extras import need_extra
 from ghest_rt.recording.reader import Recording
 
+_PICTURES = (".png", ".svg", ".pdf")
 _AXES = ("flexion", "abduction", "rotation")
 
 
@@ -41,8 +42,11 @@ def calibrate_recording(
         GhestError: The extra `plots` is missing for a picture.
     """
     station = load_station(station_file)
+    check_joint(station)
     _check_out(out, station_file, station, force=force)
     if picture is not None:
+        if picture.suffix.lower() not in _PICTURES or not picture.parent.is_dir():
+            raise BadInputError(f"{picture}: name a file that ends in {', '.join(_PICTURES)}, in a folder that is there")
         need_extra("plots", "a picture")
     recording = Recording(path)
     options = CalibrationOptions(
