@@ -59,6 +59,6 @@ class PacedWorld:
                 return
             self.slowness = (
                 f"the simulation is slower than real time: rendering a frame of {name} takes {took_ms:.0f} ms, "
-                f"and one is due every {period_ms:.0f} ms; simulate first (ghest-rt simulate) and replay that (ghest-rt --replay)"
+                f"and one is due every {period_ms:.0f} ms; record it (ghest-rt simulate), then replay it (ghest-rt --replay)"
             )
         _log.warning("%s", self.slowness)

@@ -10,8 +10,10 @@ import pytest
 from ghest_drivers.hardware.probe import ProbeResult
 from ghest_rt.cli.doctor import command
 from ghest_rt.cli.doctor.checklist import CHECKLIST
-from ghest_rt.cli.doctor.findings import exit_code, missing, note, ok
+from ghest_rt.cli.doctor.findings import Finding, State, exit_code, missing, note, ok
 from ghest_rt.cli.doctor.links import SerialPort
+from ghest_rt.cli.doctor.station_file import look_at_station
+from ghest_rt.config.shipped import shipped_config_dir
 from tests.doctor.stations import SR300, station_of
 from tests.program import COMMAND
 
@@ -63,6 +65,44 @@ def test_a_station_that_the_service_would_refuse_is_not_ready(tmp_path: Path, st
     finding = next(one for one in json.loads(done.stdout)["findings"] if one["check"] == "station file's parts")
     assert finding["exit_code"] == 2
     assert str(tmp_path / "station.toml") in finding["detail"]
+
+
+@pytest.mark.parametrize(
+    ("arm", "name", "text"),
+    [
+        ("right", "a.urdf", "Armeo Spring, right arm."),
+        ("left", "armeo_left.urdf", "It mirrors that of the right arm."),
+        ("left", "a.urdf", "As for the right arm, mirrored for the left arm."),
+        ("left", "a.urdf", "y to the patient's right"),
+        ("left", "a.urdf", ""),
+    ],
+)
+def test_an_arm_that_the_urdf_does_not_contradict_is_not_mentioned(
+    tmp_path: Path, station_text: str, arm: str, name: str, text: str
+) -> None:
+    assert arm_notes(tmp_path, station_text.replace('arm = "right"', f'arm = "{arm}"'), name, text) == []
+
+
+@pytest.mark.parametrize(
+    ("arm", "name", "text"), [("left", "a.urdf", "Armeo Spring, right arm."), ("right", "armeo_left.urdf", "")]
+)
+def test_an_arm_that_the_urdf_contradicts_is_noted(tmp_path: Path, station_text: str, arm: str, name: str, text: str) -> None:
+    (finding,) = arm_notes(tmp_path, station_text.replace('arm = "right"', f'arm = "{arm}"'), name, text)
+    assert finding.state is State.NOTE
+    assert "station.arm" in finding.remedy
+
+
+def arm_notes(folder: Path, station_text: str, name: str, text: str) -> list[Finding]:
+    """Return what is said of the arm when the URDF has this name and begins with this text."""
+    urdf = (shipped_config_dir() / "armeo_spring.urdf").read_text().replace("Armeo Spring, right arm.", text)
+    (folder / name).write_text(urdf)
+    (folder / "station.toml").write_text(station_text.replace("armeo_spring.urdf", name))
+    return [finding for finding in look_at_station(folder / "station.toml")[1] if finding.check == "arm"]
+
+
+def test_the_shipped_stations_and_their_urdfs_agree_on_the_arm() -> None:
+    for path in shipped_config_dir().glob("*.toml"):
+        assert {finding.state for finding in look_at_station(path)[1]} == {State.OK}
 
 
 def test_live_needs_a_station() -> None:

@@ -14,17 +14,17 @@ from ghest_drivers.hardware.probe import probe
 from ghest_rt.cli.console import print_json
 from ghest_rt.cli.doctor.checklist import Item, items_for
 from ghest_rt.cli.doctor.devices import Present, check_present, check_station_devices, check_without_station
-from ghest_rt.cli.doctor.findings import Finding, State, exit_code, missing, ok
+from ghest_rt.cli.doctor.findings import Finding, State, exit_code, missing
 from ghest_rt.cli.doctor.host import check_host, check_ticks
 from ghest_rt.cli.doctor.links import can_interfaces, serial_ports
 from ghest_rt.cli.doctor.live import check_cameras, check_encoders
 from ghest_rt.cli.doctor.machine import EXTRA_OF_BACKEND, check_endpoints, check_extras, check_machine, check_real_time
+from ghest_rt.cli.doctor.station_file import look_at_station
 from ghest_rt.cli.doctor.usb import usb_cameras
-from ghest_rt.config.load import LoadedStation, load_station
+from ghest_rt.config.load import LoadedStation
 from ghest_rt.config.station import Publisher
 from ghest_rt.errors import BadInputError, GhestError
 from ghest_rt.service.devices import make_devices
-from ghest_rt.service.station_check import check_station
 
 _STYLES = {State.OK: "green", State.NOTE: "yellow", State.MISSING: "bold red"}
 
@@ -58,7 +58,7 @@ def run_doctor(station_path: Path | None, live_s: float | None, as_json: bool) -
 
 
 def _look(station_path: Path | None, live_s: float | None) -> tuple[list[Finding], tuple[Item, ...]]:
-    station, findings = _load(station_path)
+    station, findings = look_at_station(station_path)
     backends = _backends(station)
     findings += check_machine()
     findings += check_extras(_extras(station, backends))
@@ -76,22 +76,6 @@ def _look(station_path: Path | None, live_s: float | None) -> tuple[list[Finding
     elif station_path is None:
         findings += check_without_station(present)
     return findings, items_for(backends)
-
-
-def _load(path: Path | None) -> tuple[LoadedStation | None, list[Finding]]:
-    if path is None:
-        return None, []
-    try:
-        station = load_station(path)
-    except BadInputError as error:
-        return None, [missing("station file", str(error), "correct it; the files in config/ are examples", exit_code=2)]
-    found = ok("station file", f"{path}: station {station.config.station.id}, {station.config.station.arm} arm")
-    try:
-        check_station(station)
-    except GhestError as error:
-        remedy = "correct it; the service would end with this message"
-        return station, [found, missing("station file's parts", str(error), remedy, error.exit_code)]
-    return station, [found, ok("station file's parts", "geometry, encoders, keys: they fit each other")]
 
 
 def _backends(station: LoadedStation | None) -> set[str]:
