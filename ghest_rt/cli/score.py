@@ -14,7 +14,7 @@ from rich.table import Table
 from ghest_rt.cli.console import print_json, printing
 from ghest_rt.cli.options import Method
 from ghest_rt.cli.unused_words import unused_in_words
-from ghest_rt.errors import BadInputError
+from ghest_rt.recording.reader import files_of
 from ghest_rt.studies.score import RecordingScore, score_recording
 
 
@@ -25,7 +25,7 @@ def score_paths(paths: Sequence[Path], method: Method | None, as_json: bool) -> 
         BadInputError: A path holds no recording, or one without truth or any angles to compare with it.
         GhestError: Standard output is full.
     """
-    files = [file for path in paths for file in _recordings(path)]
+    files = [file for path in paths for file in files_of(path)]
     console = Console(stderr=True)
     scores: list[RecordingScore] = []
     with Progress(console=console, disable=not console.is_terminal, transient=True) as progress:
@@ -43,15 +43,6 @@ def score_paths(paths: Sequence[Path], method: Method | None, as_json: bool) -> 
 
 def _show(progress: Progress, task: TaskID, share: float) -> None:
     progress.update(task, completed=share)
-
-
-def _recordings(path: Path) -> list[Path]:
-    if not path.is_dir():
-        return [path]
-    files = sorted(path.glob("*.mcap"))
-    if not files:
-        raise BadInputError(f"{path}: no recording (*.mcap) in this folder; name a file or another folder")
-    return files
 
 
 def _mean(scores: Sequence[RecordingScore]) -> dict[str, float]:

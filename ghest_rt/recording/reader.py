@@ -13,6 +13,7 @@ from ghest_rt.recording.opening import read_opening
 from ghest_rt.recording.problems import Problem, ProblemLog, Skip
 from ghest_rt.recording.scan import Block, Scan, scan_file
 from ghest_rt.recording.streams import Kind, find_streams
+from ghest_rt.security.sealing import SEALED_SUFFIX
 
 _MAX_TEXT_BYTES = 1_000_000
 
@@ -40,12 +41,20 @@ class Recording:
         self.facts = _facts(path, scan)
         self.grid_t_0_ns = _grid(scan)
         self.station = _station(path, scan)
+        damaged: dict[int, str] = {}  # by byte; reported with the events, if it does not keep the recording from being opened
         try:
             complete_channels(path, scan)
             self._streams = find_streams(path, scan, self.station.config.cameras)
-            self._opening = read_opening(path, scan, self._streams, messages_by_place(path, scan.blocks, _ignore))
+            messages = messages_by_place(path, scan.blocks, lambda block, why: damaged.__setitem__(block.byte, why))
+            self._opening = read_opening(path, scan, self._streams, messages)
         except OSError as error:
             raise _unreadable(path, error) from error
+        except BadInputError as error:
+            if not damaged:
+                raise
+            chunks = "1 chunk" if len(damaged) == 1 else f"{len(damaged)} chunks"
+            first = min(damaged)
+            raise BadInputError(f"{error}; {chunks} damaged up to there (first at byte {first}: {damaged[first]})") from error
         self.camera_infos: dict[str, CameraInfo] = self._opening.cameras
         self.encoder_joints = self._opening.joints
         unknown = [joint for joint in self.station.config.encoders.joints if joint not in self.encoder_joints]
@@ -99,12 +108,23 @@ def open_recordings(path: Path) -> list[Recording]:
     Raises:
         BadInputError: No such file or folder, no recording in it, or one that cannot be used.
     """
+    return [Recording(file) for file in files_of(path)]
+
+
+def files_of(path: Path) -> list[Path]:
+    """Return a file itself, or all `*.mcap` files of a folder by name.
+
+    Raises:
+        BadInputError: There is none in the folder.
+    """
     if not path.is_dir():
-        return [Recording(path)]
+        return [path]
     files = sorted(file for file in path.glob("*.mcap") if file.is_file())
     if not files:
+        if any(path.glob(f"*.mcap{SEALED_SUFFIX}")):
+            raise BadInputError(f"{path}: only sealed recordings in this folder; ghest-rt decrypt {path} --key FILE opens them")
         raise BadInputError(f"{path}: no recording (*.mcap) in this folder; name a file or another folder")
-    return [Recording(file) for file in files]
+    return files
 
 
 def _facts(path: Path, scan: Scan) -> dict[str, str]:
@@ -149,7 +169,3 @@ def _cut(scan: Scan) -> str:
 
 def _unreadable(path: Path, error: OSError) -> BadInputError:
     return BadInputError(f"{path}: cannot read the recording: {error.strerror or error}")
-
-
-def _ignore(block: Block, detail: str) -> None:
-    """Damage met while opening is reported when the events are read."""

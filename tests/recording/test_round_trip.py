@@ -126,6 +126,9 @@ def test_a_folder_is_its_recordings_by_name(material: Any, tmp_path: Path) -> No
 def test_a_folder_without_recordings_is_an_error(tmp_path: Path) -> None:
     with pytest.raises(BadInputError, match=r"no recording \(\*\.mcap\)"):
         open_recordings(tmp_path)
+    (tmp_path / "a.mcap.age").touch()
+    with pytest.raises(BadInputError, match=r"only sealed recordings in this folder; ghest-rt decrypt"):
+        open_recordings(tmp_path)
 
 
 def test_the_writer_refuses_what_would_make_a_bad_recording(material: Any, tmp_path: Path) -> None:

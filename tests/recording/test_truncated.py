@@ -13,6 +13,7 @@ from ghest_rt.messages.results import TruthSample
 from ghest_rt.recording.decoding import Event
 from ghest_rt.recording.problems import Skip
 from ghest_rt.recording.reader import Recording
+from ghest_rt.recording.scan import scan_file
 from tests.recording.conftest import STATION_TOML
 from tests.recording.outsider import Outsider
 
@@ -113,6 +114,18 @@ def test_a_damaged_chunk_is_left_out_and_the_rest_used(material: Any, many_chunk
     assert len(keys) // 2 < len(read) < len(keys)
     assert [key for key in keys if key in read] == read
     assert Skip.DAMAGED_CHUNK in {problem.skip for problem in recording.problems}
+
+
+def test_a_recording_that_cannot_be_opened_for_its_damage_does_not_blame_its_writer_alone(
+    many_chunks: Path, tmp_path: Path
+) -> None:
+    damaged = bytearray(many_chunks.read_bytes())
+    first = scan_file(many_chunks).blocks[0]
+    damaged[first.data_byte : first.data_byte + 4] = b"\0\0\0\0"
+    path = tmp_path / "damaged.mcap"
+    path.write_bytes(damaged)
+    with pytest.raises(BadInputError, match=rf"1 chunk damaged up to there \(first at byte {first.byte}: "):
+        Recording(path)
 
 
 def test_a_writer_that_died_leaves_a_recording(material: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
