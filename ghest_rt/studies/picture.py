@@ -14,21 +14,26 @@ from ghest_rt.errors import BadInputError
 from ghest_rt.estimation.angles import AngleSigns, Arm, clinical, euler_yxz, signs_of
 from ghest_rt.estimation.pipeline import Pipeline
 from ghest_rt.extras import need_extra
-from ghest_rt.messages.results import MarkerObservation
+from ghest_rt.messages.results import MarkerObservation, Status
 from ghest_rt.recording.reader import Recording
 from ghest_rt.studies.metrics import sample_error
 from ghest_rt.studies.score import JudgedRun, Progress, run_with_truth
 from ghest_rt.vision.station import Method
 
 _COLORS = {"flexion": "#0072B2", "abduction": "#D55E00", "rotation": "#009E73"}  # Okabe-Ito, safe for colour-blind readers
+_STATUS_COLORS = {Status.DEGRADED: "#F0E442", Status.LOST: "#CC79A7"}
 _AXIS_RGB = ((230, 60, 40), (40, 170, 60), (40, 90, 220))
+
+
+_LEAST_SAMPLES = 2
 
 
 def draw_recording(path: Path, out: Path, method: Method | None = None, progress: Progress | None = None) -> None:
     """Draw a recording with truth to a PNG, SVG or PDF file.
 
     Raises:
-        BadInputError: The recording cannot be used, or `out` has an ending that cannot be drawn.
+        BadInputError: The recording cannot be used or is too short, or `out` cannot be written or has an ending that cannot be
+            drawn.
         GhestError: Matplotlib is not installed.
     """
     if out.suffix.lower() not in {".png", ".svg", ".pdf"}:
@@ -37,32 +42,49 @@ def draw_recording(path: Path, out: Path, method: Method | None = None, progress
     from matplotlib.figure import Figure  # noqa: PLC0415 - an extra, imported only when used
 
     run = run_with_truth(path, method, progress=progress)
+    if len(run.estimates) < _LEAST_SAMPLES:
+        raise BadInputError(
+            f"{path}: too short for a picture, which takes {_LEAST_SAMPLES} samples: there is {len(run.estimates)}"
+        )
     figure = Figure(figsize=(11.0, 8.2), layout="constrained")
     grid = figure.add_gridspec(3, 2, height_ratios=(1.5, 1.1, 0.7))
-    for column, (camera, image) in enumerate(sorted(_annotated(run.recording, method).items())):
+    for column, (camera, (image, found)) in enumerate(sorted(_annotated(run.recording, method).items())):
         axes = figure.add_subplot(grid[0, column])
         axes.imshow(image, interpolation="nearest")
         marker = run.recording.station.config.cameras[camera].marker
-        axes.set_title(f"camera {camera}: marker {marker} with its estimated axes", fontsize=10)
+        axes.set_title(f"camera {camera}: marker {marker}{' with its estimated axes' if found else ' not found'}", fontsize=10)
         axes.set_axis_off()
     angles = figure.add_subplot(grid[1, :])
     _draw_angles(angles, run)
     _draw_error(figure.add_subplot(grid[2, :], sharex=angles), run)
-    figure.suptitle(f"{path.stem}, method {run.method}", fontsize=12)
-    figure.savefig(out, dpi=130)
+    figure.suptitle(_title(run), fontsize=12)
+    try:
+        figure.savefig(out, dpi=130)
+    except OSError as error:
+        raise BadInputError(f"{out}: cannot be written: {error.strerror or error}") from error
 
 
-def _annotated(recording: Recording, method: Method | None) -> dict[str, NDArray[np.uint8]]:
-    """Return each camera's image near the middle of the recording, the marker's axes drawn on it, at least 480 px high."""
+def _title(run: JudgedRun) -> str:
+    facts = run.recording.facts
+    told = {"motion": "movement", "sensor": "sensor", "seed": "seed"}
+    of_what = [f"{word} {facts[fact]}" for fact, word in told.items() if fact in facts]
+    return ", ".join([f"{run.recording.path.name}: method {run.method}", *of_what])
+
+
+def _annotated(recording: Recording, method: Method | None) -> dict[str, tuple[NDArray[np.uint8], bool]]:
+    """Return each camera's image near the middle of the recording, at least 480 px high, and whether its marker was found.
+
+    If it was, the marker's axes are drawn on the image.
+    """
     pipeline = Pipeline(recording.station, recording.camera_infos, recording.encoder_joints, method)
-    images: dict[str, NDArray[np.uint8]] = {}
+    images: dict[str, tuple[NDArray[np.uint8], bool]] = {}
     for frame, observation in _middle_frames(recording, pipeline):
         scale = max(1, 480 // frame.color_rgb.shape[0])
         image = np.ascontiguousarray(np.kron(frame.color_rgb, np.ones((scale, scale, 1), np.uint8)))
         if observation.camera_from_marker is not None:
             side_m = recording.station.config.markers[observation.marker].half_spacing_m
             _draw_axes(image, frame, observation.camera_from_marker, side_m, scale)
-        images[frame.info.name] = image
+        images[frame.info.name] = image, observation.camera_from_marker is not None
     return images
 
 
@@ -108,12 +130,29 @@ def _draw_angles(axes: Any, run: JudgedRun) -> None:
         estimated.append((seconds, *_angles_deg(estimate.gh_from_arm, arm, signs)))
         true.append((seconds, *_angles_deg(truth.gh_from_arm if truth is not None else None, arm, signs)))
     for column, (name, color) in enumerate(_COLORS.items(), start=1):
-        axes.plot(*_columns(true, column), color="0.78", linewidth=4.5, label="truth" if column == len(_COLORS) else None)
+        axes.plot(*_columns(true, column), color="0.78", linewidth=4.5)
         axes.plot(*_columns(estimated, column), color=color, linewidth=1.2, label=name)
-    axes.set_ylabel(f"{'GH' if config.joint.name == 'gh' else config.joint.name} angle (deg)")
-    axes.legend(ncols=4, fontsize=9, loc="lower right", bbox_to_anchor=(1.0, 1.0), frameon=False)
+    axes.plot([], [], color="0.78", linewidth=4.5, label="truth")
+    _shade_status(axes, run)
+    axes.set_ylabel(f"{'GH' if config.joint.name == 'gh' else config.joint.name} angle (°)")
+    axes.legend(ncols=6, fontsize=9, loc="lower right", bbox_to_anchor=(1.0, 1.0), frameon=False)
     axes.tick_params(labelbottom=False)
     axes.grid(alpha=0.3)
+
+
+def _shade_status(axes: Any, run: JudgedRun) -> None:
+    """Shade the times at which samples are degraded or lost, each sample to the middle between its neighbours."""
+    t_s = (np.array([estimate.t_sample_ns for estimate in run.estimates]) - run.estimates[0].t_sample_ns) * 1e-9
+    edges = np.concatenate(([t_s[0]], (t_s[1:] + t_s[:-1]) / 2, [t_s[-1]]))
+    for status, color in _STATUS_COLORS.items():
+        there = np.array([estimate.status is status for estimate in run.estimates])
+        bounds = np.flatnonzero(np.diff(np.concatenate(([False], there, [False]))))
+        for first, last in bounds.reshape(-1, 2):
+            axes.axvspan(edges[first], edges[last], color=color, alpha=0.35, linewidth=0)
+        share = 100.0 * there.mean()
+        axes.fill_between(
+            [], [], color=color, alpha=0.35, label=f"{status} ({share:.1f} %)" if there.any() else f"{status}: none"
+        )
 
 
 def _angles_deg(gh_from_arm: NDArray[np.float64] | None, arm: Arm, signs: AngleSigns) -> tuple[float, float, float]:
@@ -137,7 +176,8 @@ def _draw_error(axes: Any, run: JudgedRun) -> None:
             ((estimate.t_sample_ns - t_0_ns) * 1e-9, math.nan if error is None else math.degrees(error.orientation_rad))
         )
     axes.plot([s for s, _ in points], [e for _, e in points], color="0.2", linewidth=0.9)
-    axes.set_ylabel("orientation\nerror (deg)")
+    _shade_status(axes, run)
+    axes.set_ylabel("orientation\nerror (°)")
     axes.set_xlabel("time (s)")
     axes.set_ylim(bottom=0.0)
     axes.grid(alpha=0.3)

@@ -1,6 +1,7 @@
 """Score and picture of a shipped recording."""
 
 import json
+import re
 from pathlib import Path
 
 import cv2
@@ -79,3 +80,27 @@ def test_the_picture_is_drawn_and_a_wrong_ending_refused(tmp_path: Path) -> None
     assert shares == sorted(shares)
     with pytest.raises(BadInputError, match=r"\.png, \.svg or \.pdf"):
         draw_recording(FIXTURES / "SFE.mcap", tmp_path / "sfe.gif")
+    with pytest.raises(BadInputError, match=r"sfe.svg: cannot be written: No such file or directory"):
+        draw_recording(FIXTURES / "SFE.mcap", tmp_path / "none" / "sfe.svg")
+
+
+def test_the_picture_names_what_it_shows_in_order_and_says_what_was_lost(tmp_path: Path) -> None:
+    out = tmp_path / "a.mcap"
+    blind = parse_fault("blind:r1:0.2:0.5")
+    simulate(SimulateOptions(out=out, movement="SFE", duration_s=0.8, faults=(blind,), seed=7), lambda _: None)
+    draw_recording(out, tmp_path / "a.svg", "refined")
+    # Text is drawn as outlines, each after a comment with what it says.
+    said = [line.strip() for line in (tmp_path / "a.svg").read_text().splitlines() if line.strip().startswith("<!--")]
+    legend = [re.sub(r"<!-- (\w+).* -->", r"\1", line) for line in said]
+    at = legend.index("flexion")
+    assert legend[at : at + 6] == ["flexion", "abduction", "rotation", "truth", "degraded", "lost"]
+    assert "<!-- a.mcap: method refined, movement SFE, sensor paper, seed 7 -->" in said
+    assert "<!-- camera r1: marker m1 not found -->" in said
+
+
+def test_a_recording_of_one_sample_is_no_picture(tmp_path: Path) -> None:
+    out = tmp_path / "a.mcap"
+    simulate(SimulateOptions(out=out, movement="SFE", duration_s=0.01), lambda _: None)
+    with pytest.raises(BadInputError, match=r"a.mcap: too short for a picture, which takes 2 samples: there is 1"):
+        draw_recording(out, tmp_path / "a.png")
+    assert not (tmp_path / "a.png").exists()
