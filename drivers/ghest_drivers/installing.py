@@ -10,9 +10,14 @@ from urllib.parse import unquote, urlsplit
 _DISTRIBUTION = "ghest-rt"
 
 
-def pip_install(extra: str = "") -> str:
-    """Return the command that installs ghest-rt, with an extra, as it was installed: from its folder, file or repository."""
-    return f"pip install {requirement(_origin(), extra)}"
+def pip_install(extra: str = "", *, elsewhere: bool = False) -> str:
+    """Return the command that installs ghest-rt, with an extra, as it was installed: from its folder, file or repository.
+
+    Args:
+        extra: Name of the extra; may be empty.
+        elsewhere: Whether it is for another environment: then it does not go on depending on the folder.
+    """
+    return f"pip install {requirement(_origin(), extra).removeprefix('-e ' if elsewhere else '')}"
 
 
 def requirement(origin: dict[str, Any] | None, extra: str) -> str:

@@ -134,6 +134,14 @@ def test_what_cannot_be_used_is_refused_and_nothing_is_written(
     assert files_in(root) == set()
 
 
+def test_a_program_that_the_services_user_cannot_see_is_a_warning_of_the_dry_run(install: Install, root: Path) -> None:
+    shown = install("--station", STATION, "--executable", "/home/me/venv/bin/ghest-rt", "--dry-run")
+    assert shown.returncode == 0
+    assert "would write" in shown.stdout
+    assert "warning" in shown.stderr and "cannot see this folder" in shown.stderr
+    assert files_in(root) == set()
+
+
 @pytest.mark.parametrize("urdf", ["../armeo_spring.urdf", "station.toml"])
 def test_a_station_reaching_out_of_its_folder_is_refused(install: Install, root: Path, tmp_path: Path, urdf: str) -> None:
     other = other_station(tmp_path / "other")

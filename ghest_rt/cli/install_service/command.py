@@ -53,7 +53,11 @@ def install_service(options: InstallOptions) -> None:
         for line in shown(plan.steps):
             console.print(f"would {line}", markup=False)
         _print_notes(console, plan)
+        if plan.obstacle:
+            sys.stderr.write(f"warning: as it is this would be refused: {plan.obstacle}\n")
         return
+    if plan.obstacle:
+        raise BadInputError(plan.obstacle)
     if target.live and os.geteuid() != 0:
         raise GhestError(
             "this changes the system: run it as root, sudo ghest-rt install-service …; --dry-run shows what it does"

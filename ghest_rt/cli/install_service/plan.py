@@ -4,6 +4,7 @@ import re
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 
+from ghest_drivers.installing import pip_install
 from ghest_rt.cli.install_service.cpus import check_cpus
 from ghest_rt.cli.install_service.gateway import GATEWAY_UNIT, IDENTITY_DIR, KEY_PATH, gateway_unit, identity_files
 from ghest_rt.cli.install_service.record import RECORD, Installed, InstalledService, read_record, sha256
@@ -68,10 +69,17 @@ class Target:
 
 @dataclass(slots=True)
 class Plan:
-    """Steps in order, and what the user should know."""
+    """What is to be done.
+
+    Attributes:
+        steps: In order.
+        notes: What the user should know.
+        obstacle: Why it must not be done as it is; "" if it may.
+    """
 
     steps: list[Step] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    obstacle: str = ""
 
 
 def plan_install(
@@ -99,7 +107,7 @@ def plan_install(
         BadInputError: Something given cannot be used, or a file to be replaced was changed by somebody else.
     """
     installed = read_record(target.root)
-    plan = Plan()
+    plan = Plan(obstacle=_out_of_sight(executable))
     files = _system_files(target, shipped, executable, cpus, systemd_version)
     others = [
         (unit, target.root / one.station)
@@ -203,14 +211,19 @@ def _check_executable(executable: Path, must_exist: bool) -> None:
         raise BadInputError(f"--executable {executable}: an absolute path of letters, digits and . _ / + -")
     if must_exist and not executable.is_file():
         raise BadInputError(f"{executable} is not there; name the program with --executable FILE")
+
+
+def _out_of_sight(executable: Path) -> str:
+    """Return why the service's user could not start the program, or ""."""
     interpreter = (executable.parent / "python3").resolve()
     for path in (executable, interpreter):
         if any(PurePosixPath(path).is_relative_to(hidden) for hidden in _HIDDEN):
-            raise BadInputError(
+            return (
                 f"{path}: the service's user cannot see this folder. Install ghest-rt where it can: "
-                "python3 -m venv /opt/ghest-rt && /opt/ghest-rt/bin/pip install ghest-rt, "
+                f"python3 -m venv /opt/ghest-rt && /opt/ghest-rt/bin/{pip_install(elsewhere=True)}, "
                 "then run /opt/ghest-rt/bin/ghest-rt install-service"
             )
+    return ""
 
 
 def _gateway(
