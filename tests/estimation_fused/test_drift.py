@@ -70,6 +70,13 @@ def test_slides_from_the_start_cost_far_less_than_they_cost_the_paper() -> None:
     assert np.mean(errors) < 0.8
 
 
+@pytest.mark.parametrize("mm", [8, 10, 12])
+def test_a_smaller_slide_of_m0_across_the_line_to_the_gh_centre_passes_for_no_turn(mm: int) -> None:
+    """Where the GH centre is found says as much for a turn of m0: such a turn, wrongly taken out, would cost 5 deg."""
+    judged = run(Trial(duration_s=6.0, drifts=(Drift("m0", slide(1, 1e-3 * mm)),)))
+    assert rms_deg(judged, 3.0) < 2.5
+
+
 def test_a_slide_along_the_arm_does_no_harm_where_the_arm_length_is_unknown() -> None:
     """Nothing tells it from a longer arm; the angles do not depend on it."""
     judged = run(Trial(duration_s=4.0, drifts=(Drift("m1", slide(1)),)))

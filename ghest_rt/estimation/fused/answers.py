@@ -86,7 +86,8 @@ class Answers:
         self.of_marker = [self._moved[:, part].any(axis=1).astype(float) for part in (slice(0, 2), slice(2, 4))]
         self.turned = (kinds[:, 3] == _EVER).astype(float)
         self.cost = self._moved @ np.array([tuning.slide_cost, tuning.turn_cost[0], tuning.slide_cost, tuning.turn_cost[1]])
-        self.leniency = tuning.turn_doubt * (self._moved[:, 1] ^ self._moved[:, 3])
+        only_one = self._moved[:, 1] ^ self._moved[:, 3]
+        self.leniency = only_one * (self._moved[:, (1, 3)] @ np.array(tuning.turn_doubt))
         length = tuning.unknown_arm_length_m if arm_length_m is None else tuning.arm_length_m
         slides = [np.array(tuning.slide_m) ** 2, np.full(2, tuning.calibrated_m**2), np.full(2, tuning.exact_m**2)]
         turns = [np.array(tuning.turn_rad) ** 2, np.full(2, tuning.calibrated_rad**2), np.full(2, tuning.exact_rad**2)]

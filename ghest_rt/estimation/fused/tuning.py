@@ -52,7 +52,7 @@ class Tuning:
         exact_rad: What is left of a turn where there is no drift.
         slide_cost: Twice the logarithm of the odds against a slide.
         turn_cost: Twice the logarithm of the odds against a turn: m0, m1.
-        turn_doubt: Taken off the cost of a turn for the covariance.
+        turn_doubt: Taken off the cost of a turn for the covariance: m0, m1.
         arm_length_m: Standard deviation of a calibrated arm length.
         axial_memory_s: The disagreement of forearm and m1 about the arm is averaged over this time; faster is movement.
         reference_s: Over this time at first it is learned how forearm and m1 agree, and where the elbow is.
@@ -116,7 +116,7 @@ class Tuning:
     exact_m: float = 1e-5
     exact_rad: float = math.radians(0.005)
     slide_cost: float = 12.0
-    turn_cost: tuple[float, float] = (15.0, 13.5)
+    turn_cost: tuple[float, float] = (21.0, 13.5)
     axial_memory_s: float = 1.0
     reference_s: float = 2.0
     elbow_memory_s: float = 0.3
@@ -134,6 +134,6 @@ class Tuning:
     lag_sigma: float = 0.3
     lag_tolerance: float = 0.04
     lag_cost: float = 8.0
-    turn_doubt: float = 9.0
+    turn_doubt: tuple[float, float] = (15.0, 9.0)
     arm_length_m: float = 1e-3
     unknown_arm_length_m: float = 0.05
