@@ -1,9 +1,9 @@
 """What a calibration is worth: angles of a later session with the true, a spoilt, and the calibrated station file.
 
-`python -m benchmarks.calibration [--sensors paper,sr300] [--seeds 1,2,3] [--duration 8] [--soft-tissue none]` from the
-project's root. Centres are spoilt by 15 mm and attitudes by 5°, in directions drawn by the seed; the calibration session is
-movement CAL of the same seed, the session judged is COMB of another one, method fused. Soft tissue is that of the calibration
-session alone.
+`python -m benchmarks.calibration [--sensors paper,sr300] [--seeds 1,2,3] [--duration 8] [--soft-tissue none] [--wrong-mounts]`
+from the project's root. Centres are spoilt by 15 mm and attitudes by 5°, in directions drawn by the seed; the calibration
+session is movement CAL of the same seed, the session judged is COMB of another one, method fused. Soft tissue is that of the
+calibration session alone. With `--wrong-mounts` every station file has both cameras 1° and 3 mm off, the true one as well.
 """
 
 import argparse
@@ -28,7 +28,8 @@ from ghest_rt.simulation.anatomy import anatomy
 from ghest_rt.simulation.building import build_world
 from ghest_rt.simulation.options import SimulateOptions
 from ghest_rt.studies.observing.observed import Observed, observe
-from ghest_rt.studies.session.estimating import estimate_session
+from ghest_rt.studies.observing.scenario import MountError
+from ghest_rt.studies.session.estimating import estimate_session, with_mount_errors
 from ghest_rt.studies.truth import TruthTrack
 
 _ANOTHER = 100  # added to the seed of the calibration session
@@ -56,6 +57,23 @@ def with_(station: LoadedStation, changes: dict[str, object]) -> LoadedStation:
     """Return the station with other values in its calibration."""
     calibration = Calibration.model_validate({**station.config.calibration.model_dump(), **changes})
     return replace(station, config=station.config.model_copy(update={"calibration": calibration}))
+
+
+def with_wrong_mounts(station: LoadedStation, seed: int) -> LoadedStation:
+    """Return the station with both camera mounts 1° and 3 mm off."""
+    rng = np.random.default_rng((seed, *b"mounts"))
+
+    def direction() -> tuple[float, float, float]:
+        v = rng.standard_normal(3)
+        x, y, z = (v / np.linalg.norm(v)).tolist()
+        return x, y, z
+
+    def off(size: float) -> tuple[float, float, float]:
+        x, y, z = direction()
+        return size * x, size * y, size * z
+
+    errors = {camera: MountError(rotation_rad=off(math.radians(1.0)), translation_m=off(0.003)) for camera in ("r0", "r1")}
+    return with_mount_errors(station, errors)
 
 
 def calibrated(session: Observed, station: LoadedStation, options: CalibrationOptions) -> LoadedStation | None:
@@ -100,7 +118,7 @@ def judged(session: Observed, station: LoadedStation, arm_length_m: float) -> di
     return dict(zip(_COLUMNS, map(float, values), strict=True))
 
 
-def run(sensor: str, seed: int, duration_s: float, soft_tissue: str) -> dict[str, dict[str, float]]:
+def run(sensor: str, seed: int, duration_s: float, soft_tissue: str, *, wrong_mounts: bool) -> dict[str, dict[str, float]]:
     """Return the figures of one sensor and seed by variant."""
     base = SimulateOptions(out=Path(), sensor=sensor, seed=seed)  # type: ignore[arg-type]
     world = build_world(replace(base, movement="CAL", soft_tissue=soft_tissue))  # type: ignore[arg-type]
@@ -109,9 +127,10 @@ def run(sensor: str, seed: int, duration_s: float, soft_tissue: str) -> dict[str
     later = observe(
         build_world(replace(base, movement="COMB", seed=seed + _ANOTHER, duration_s=duration_s)), ("fused", "photometric")
     )
-    bad = spoilt(later.station, seed)
+    right = with_wrong_mounts(later.station, seed) if wrong_mounts else later.station
+    bad = spoilt(right, seed)
     stations = {
-        "true": later.station,
+        "true": right,
         "spoilt": bad,
         "calibrated": calibrated(session, bad, CalibrationOptions(calibration_id="new")),
         _VARIANTS[3]: calibrated(session, bad, CalibrationOptions(calibration_id="new", elbow_from="exoskeleton")),
@@ -126,17 +145,20 @@ def main() -> None:
     parser.add_argument("--seeds", default="1,2,3", help="with commas between")
     parser.add_argument("--duration", type=float, default=8.0, help="seconds of COMB")
     parser.add_argument("--soft-tissue", default="none", help="none, published or severe")
+    parser.add_argument("--wrong-mounts", action="store_true", help="both cameras 1° and 3 mm off")
     arguments = parser.parse_args()
     table = Table("sensor", "seed", "station file", *_COLUMNS)
     rows = []
     for sensor in arguments.sensors.split(","):
         for seed in map(int, arguments.seeds.split(",")):
-            for variant, values in run(sensor, seed, arguments.duration, arguments.soft_tissue).items():
+            results = run(sensor, seed, arguments.duration, arguments.soft_tissue, wrong_mounts=arguments.wrong_mounts)
+            for variant, values in results.items():
                 rows.append({"sensor": sensor, "seed": seed, "station": variant, **values})
                 table.add_row(sensor, str(seed), variant, *(f"{value:.2f}" for value in values.values()))
     Console(width=150).print(table)
     FOLDER.mkdir(parents=True, exist_ok=True)
-    (FOLDER / "calibration.json").write_text(json.dumps({"soft_tissue": arguments.soft_tissue, "rows": rows}, indent=2) + "\n")
+    summary = {"soft_tissue": arguments.soft_tissue, "wrong_mounts": arguments.wrong_mounts, "rows": rows}
+    (FOLDER / "calibration.json").write_text(json.dumps(summary, indent=2) + "\n")
 
 
 if __name__ == "__main__":

@@ -33,17 +33,15 @@ def rows_of(old: Calibration, new: Calibration, found: Found) -> list[Row]:
     """Return the rows of the table."""
     sigma = np.sqrt(np.diag(found.gh.covariance))
     hold = found.hold
-    attitude = "as held, {:.2f}°"
+    attitude = "{:.2f}° held"
     m1 = np.array(new.m1_from_elw)
     elbow_sigma_m = np.sqrt(np.square(sigma[3:]) + np.square(found.length.sigma_m * m1[:3, 1]))
     rows = [
         _place("GH centre in m0, mm", np.array(old.m0_from_gh)[:3, 3], np.array(new.m0_from_gh)[:3, 3], sigma[:3]),
         _place("GH centre in m1, mm", _gh_in_m1(old), _gh_in_m1(new), sigma[3:]),
-        _attitude("attitude of GH frame in m0", old.m0_from_gh, new.m0_from_gh, attitude.format(math.degrees(hold.m0_rad))),
-        _attitude(
-            "attitude of elbow frame in m1", old.m1_from_elw, new.m1_from_elw, attitude.format(math.degrees(hold.m1_rad))
-        ),
-        _place("elbow centre in m1, mm", np.array(old.m1_from_elw)[:3, 3], m1[:3, 3], elbow_sigma_m),
+        _attitude("GH frame, turned in m0", old.m0_from_gh, new.m0_from_gh, attitude.format(math.degrees(hold.m0_rad))),
+        _attitude("elbow frame, turned in m1", old.m1_from_elw, new.m1_from_elw, attitude.format(math.degrees(hold.m1_rad))),
+        _place("elbow in m1, mm", np.array(old.m1_from_elw)[:3, 3], m1[:3, 3], elbow_sigma_m),
         _length(old, new, found),
         _elbow_in_link(old, new, found),
     ]
@@ -51,7 +49,7 @@ def rows_of(old: Calibration, new: Calibration, found: Found) -> list[Row]:
         before = old.reference.forearm_twist_deg
         after = new.reference.forearm_twist_deg
         change = "" if before is None else f"{after - before:+.2f}°"
-        strayed = f"as held, {math.degrees(found.forearm_twist_sigma_rad):.2f}°"
+        strayed = f"{math.degrees(found.forearm_twist_sigma_rad):.2f}° held"
         rows.append(Row("forearm twist", "" if before is None else f"{before:.2f}°", f"{after:.2f}°", change, strayed))
     return rows
 
@@ -98,7 +96,7 @@ def _attitude(quantity: str, before: object, after: object, sigma: str) -> Row:
 
 
 def _tilt(R: Array) -> str:
-    return f"{math.degrees(angle_between_rad(R, np.eye(3))):.2f}° of E's"
+    return f"{math.degrees(angle_between_rad(R, np.eye(3))):.2f}°"
 
 
 def _length(old: Calibration, new: Calibration, found: Found) -> Row:
@@ -115,7 +113,7 @@ def _length(old: Calibration, new: Calibration, found: Found) -> Row:
 def _elbow_in_link(old: Calibration, new: Calibration, found: Found) -> Row:
     before, after = old.reference.elbow_in_link_m, new.reference.elbow_in_link_m
     return _place(
-        "elbow in the link of r1, mm",
+        "elbow in link of r1, mm",
         None if before is None else np.array(before),
         None if after is None else np.array(after),
         found.elbow_in_link_sigma_m,

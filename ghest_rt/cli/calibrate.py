@@ -110,14 +110,17 @@ def _print(path: Path, station: LoadedStation, session: Session, outcome: Outcom
     if found is None or new is None:
         return
     table = Table(title=f"Calibration from {path.name}", title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
-    table.add_column("quantity", overflow="fold")
+    table.add_column("quantity", no_wrap=True)
     for column in ("before", "after", "change", "std. dev."):
-        table.add_column(column, justify="right")
+        table.add_column(column, justify="right", overflow="fold")
     for row in rows_of(station.config.calibration, new, found):
         table.add_row(row.quantity, row.before, row.after, row.change, row.sigma)
     console.print(table)
+    console.print(
+        "std. dev.: what is random within this session; 'held': by how much the neutral posture strayed", highlight=False
+    )
     for line in (*_quality(session, found), *notes_of(found)):
-        console.print(line, highlight=False, markup=False)
+        console.print(f"- {line}", highlight=False, markup=False)
     verdict = "not good enough" if outcome.objections else "good"
     console.print(f"verdict: {verdict}", style="red" if outcome.objections else "green", highlight=False)
 
