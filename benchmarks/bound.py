@@ -154,4 +154,4 @@ def _draw(axis: Any, distances_m: tuple[float, ...], curves: dict[str, list[floa
     axis.set_yscale("log")
     axis.set_title(title, fontsize=9)
     axis.set_xlabel("distance (m)")
-    axis.set_ylabel("orientation RMS (deg)")
+    axis.set_ylabel("orientation RMS (°)")

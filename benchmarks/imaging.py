@@ -4,7 +4,7 @@ Frames of the simulated clinic (`ghest-rt simulate --image …`) in short bursts
 last frame of each burst is scored against the truth.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal
 
@@ -37,7 +37,7 @@ CASES: dict[str, tuple[str, ...]] = {
 }
 SENSORS: tuple[SensorName, ...] = ("paper", "sr300")
 METHODS: tuple[Method, ...] = ("paper", "aruco", "refined", "photometric")
-_COLORS = {"paper": "#999999", "aruco": "#D55E00", "refined": "#56B4E9", "photometric": "#0072B2"}
+_STYLES = {"paper": ("#D55E00", "s"), "aruco": ("#CC79A7", "^"), "refined": ("#0072B2", "o"), "photometric": ("#56B4E9", "D")}
 _OUT = Path(__file__).resolve().parents[1] / "out" / "benchmarks" / "imaging.png"
 _FRAMES_PER_BURST = 3
 _SEED = 11
@@ -99,9 +99,8 @@ def run(quick: bool) -> dict[str, Any]:
     """Return RMS degrees and millimetres and mean NEES per sensor, fault and method; draw out/benchmarks/imaging.png."""
     count = 4 if quick else 30
     results: dict[str, Any] = {"poses per cell": 2 * count}
-    figure = Figure(figsize=(11.0, 7.0), layout="constrained")
-    axes = figure.subplots(2, len(SENSORS), sharex=True)
-    for column, sensor in enumerate(SENSORS):
+    found: dict[str, dict[str, list[Array]]] = {}
+    for sensor in SENSORS:
         rms: dict[str, list[Array]] = {method: [] for method in METHODS}
         for case, texts in CASES.items():
             scenes = {code: list(bursts(sensor, texts, code, count)) for code in ("disks", "aruco")}
@@ -110,24 +109,38 @@ def run(quick: bool) -> dict[str, Any]:
                 given = scenes["aruco" if method == "aruco" else "disks"]
                 found, nees = errors(method, given)
                 rms[method].append(np.sqrt(np.mean(found**2, axis=0)) if len(found) else np.full(2, np.nan))
-                line[method] = "{:.4f} deg {:.4f} mm".format(*rms[method][-1])
+                line[method] = "{:.4f}° {:.4f} mm".format(*rms[method][-1])
                 line[method] += f", NEES {np.mean(nees):.1f}" if nees else ""
                 line[method] += f", {len(given) - len(found)} not found" if len(found) < len(given) else ""
             results[f"{sensor}, {case}"] = line
-        for row, label in enumerate(("orientation RMS (deg)", "position RMS (mm)")):
-            _draw(axes[row][column], {method: [pair[row] for pair in pairs] for method, pairs in rms.items()}, label)
-        axes[0][column].set_title(f"{sensor} sensor")
-    figure.legend(*axes[0][0].get_legend_handles_labels(), loc="outside upper center", ncols=len(METHODS), fontsize=9)
+        found[sensor] = rms
     _OUT.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(_OUT, dpi=120)
+    draw(found, _OUT)
     return results
 
 
-def _draw(axis: Any, values: dict[str, list[float]], label: str) -> None:
-    for offset, (method, heights) in enumerate(values.items()):
-        places = np.arange(len(heights)) + 0.2 * (offset - 1.5)
-        axis.bar(places, heights, width=0.2, color=_COLORS[method], label=method)
-    axis.set_yscale("log")
-    axis.set_ylabel(label)
-    axis.set_xticks(np.arange(len(CASES)), list(CASES), rotation=40, ha="right", fontsize=8)
-    axis.grid(axis="y", alpha=0.3)
+def draw(found: Mapping[str, Mapping[str, Sequence[Array]]], out: Path) -> None:
+    """Draw the RMS errors (degrees, millimetres) of every sensor and method, case by case; sensors share an axis.
+
+    Args:
+        found: By sensor and method a pair for every case.
+        out: The picture.
+    """
+    figure = Figure(figsize=(11.0, 7.0), layout="constrained")
+    axes = figure.subplots(2, len(found), sharex=True, sharey="row")
+    for column, (sensor, rms) in enumerate(found.items()):
+        for row, label in enumerate(("orientation RMS (°)", "position RMS (mm)")):
+            axis = axes[row][column]
+            for beside, (method, pairs) in zip((0.0, 0.0, -0.12, 0.12), rms.items(), strict=True):
+                color, symbol = _STYLES[method]
+                places = np.arange(len(pairs)) + beside
+                axis.plot(places, [pair[row] for pair in pairs], symbol, color=color, markersize=5.5, label=method)
+            axis.set_yscale("log")
+            axis.yaxis.set_major_formatter("{x:g}")
+            axis.set_xticks(np.arange(len(CASES)), list(CASES), rotation=40, ha="right", fontsize=8)
+            axis.grid(alpha=0.3)
+            if column == 0:
+                axis.set_ylabel(label)
+        axes[0][column].set_title(f"{sensor} sensor")
+    figure.legend(*axes[0][0].get_legend_handles_labels(), loc="outside upper center", ncols=len(METHODS), fontsize=9)
+    figure.savefig(out, dpi=120)

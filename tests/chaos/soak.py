@@ -194,7 +194,7 @@ def draw(readings: list[Reading], report: dict[str, Any], path: Path) -> None:
         axes.legend(loc="lower right", bbox_to_anchor=(1.0, 0.99), ncols=3, fontsize=8, frameon=False)
     figure.suptitle(
         f"{report['minutes']:g} min, {report['samples']} samples, {report['faults_injected']} device faults: "
-        f"memory {report['memory_mb_per_hour']:+.1f} MB/h, stale as fresh {report['stale_as_fresh']}"
+        f"memory {report['memory_mb_per_hour']:+.1f} MB/h, {report['stale_as_fresh'] or 'no'} stale samples published as fresh"
     )
     figure.savefig(path, dpi=130)
     plt.close(figure)
