@@ -10,13 +10,14 @@ from rich.console import Console
 from rich.table import Table
 
 from ghest_rt.cli.options import Json
+from ghest_rt.cli.plain import PlainTyper
 from ghest_rt.extras import need_extra
 from ghest_rt.security.roles import Role, parse_common_name
 
 if TYPE_CHECKING:
     from ghest_rt.security.authority import Authority, Issued
 
-app = typer.Typer(
+app = PlainTyper(
     no_args_is_help=True,
     help=(
         "Certificates for stations that are reached over a network: the clinic's authority and its identities "

@@ -9,10 +9,11 @@ import typer
 from ghest_rt.cli.certs import app as certs_app
 from ghest_rt.cli.commands import installation, live, protection, recordings
 from ghest_rt.cli.options import Json, ListenEndpoint, MethodOption, NoPublish, OtherStation, Verbose
+from ghest_rt.cli.plain import PlainTyper
 from ghest_rt.cli.study.app import app as study_app
 from ghest_rt.errors import GhestError
 
-app = typer.Typer(
+app = PlainTyper(
     name="ghest-rt",
     no_args_is_help=True,
     add_completion=False,
@@ -81,7 +82,7 @@ def root(
 def main() -> None:
     """Run the command line; errors that a user can mend become one message and an exit code."""
     try:
-        app()
+        app(_verbose_first(sys.argv[1:]))
     except GhestError as error:
         _fail(str(error), error.exit_code)
     except KeyboardInterrupt:
@@ -92,6 +93,13 @@ def main() -> None:
         if not isinstance(error, DriverError):
             raise
         _fail(str(error), 3)
+
+
+def _verbose_first(arguments: list[str]) -> list[str]:
+    """Return the arguments with --verbose before the command, behind which it may stand as well."""
+    end = arguments.index("--") if "--" in arguments else len(arguments)
+    verbose = [word for word in arguments[:end] if word in ("--verbose", "-v")]
+    return [*verbose[:1], *(word for word in arguments[:end] if word not in ("--verbose", "-v")), *arguments[end:]]
 
 
 def _fail(message: str, exit_code: int) -> None:

@@ -105,7 +105,9 @@ SimulatedSeed = Annotated[int, typer.Option(metavar="N", help="Of a simulated st
 Json = Annotated[
     bool, typer.Option("--json", metavar="", help="Print one JSON document on standard output and nothing else there")
 ]
-Verbose = Annotated[bool, typer.Option("--verbose", "-v", metavar="", help="Log more, to standard error")]
+Verbose = Annotated[
+    bool, typer.Option("--verbose", "-v", metavar="", help="Log more, to standard error; before or after a command")
+]
 Shifts = Annotated[
     list[str] | None,
     typer.Option(

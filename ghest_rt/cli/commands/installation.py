@@ -6,8 +6,9 @@ from typing import Annotated
 import typer
 
 from ghest_rt.cli.options import Json
+from ghest_rt.cli.plain import PlainTyper
 
-app = typer.Typer()
+app = PlainTyper()
 
 
 @app.command()

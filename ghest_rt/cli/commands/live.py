@@ -17,8 +17,9 @@ from ghest_rt.cli.options import (
     SimulatedSeed,
     StationFile,
 )
+from ghest_rt.cli.plain import PlainTyper
 
-app = typer.Typer()
+app = PlainTyper()
 
 
 @app.command()

@@ -5,7 +5,9 @@ from typing import Annotated
 
 import typer
 
-app = typer.Typer()
+from ghest_rt.cli.plain import PlainTyper
+
+app = PlainTyper()
 
 
 @app.command()
@@ -46,7 +48,7 @@ def recording_key(
 def decrypt(
     sealed: Annotated[
         list[Path],
-        typer.Argument(metavar="RECORDING...", help="Sealed recordings (.age), or folders of them", show_default=False),
+        typer.Argument(metavar="RECORDING", help="Sealed recordings (.age), or folders of them", show_default=False),
     ],
     key: Annotated[Path, typer.Option(metavar="FILE", help="Secret key", show_default=False)],
     out: Annotated[Path | None, typer.Option(metavar="FOLDER", help="Where to, if not beside them", show_default=False)] = None,

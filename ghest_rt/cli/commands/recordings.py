@@ -22,8 +22,9 @@ from ghest_rt.cli.options import (
     SoftTissue,
     Turns,
 )
+from ghest_rt.cli.plain import PlainTyper
 
-app = typer.Typer()
+app = PlainTyper()
 
 
 @app.command()
@@ -129,7 +130,7 @@ def estimate(
 @app.command()
 def score(
     recordings: Annotated[
-        list[Path], typer.Argument(metavar="RECORDING...", help="Recordings with truth, or folders of them", show_default=False)
+        list[Path], typer.Argument(metavar="RECORDING", help="Recordings with truth, or folders of them", show_default=False)
     ],
     method: MethodOption = None,
     as_json: Json = False,
