@@ -1,5 +1,6 @@
 """What drives each joint between the base link and another link: an encoder, a setting, another joint, or nothing."""
 
+import difflib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -97,7 +98,9 @@ def chain(urdf: Urdf, base_link: str, link: str) -> tuple[Joint, ...]:
 
 def _known(urdf: Urdf, name: str, key: str) -> Joint:
     if name not in urdf.joints:
-        raise BadInputError(f'{key}: {urdf.source} has no joint "{name}"; it has {", ".join(urdf.joints)}')
+        nearest = difflib.get_close_matches(name, urdf.joints, n=1)
+        guess = f"; did you mean {nearest[0]}?" if nearest else ""
+        raise BadInputError(f'{key}: {urdf.source} has no joint "{name}"; it has {", ".join(urdf.joints)}{guess}')
     return urdf.joints[name]
 
 

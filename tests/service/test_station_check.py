@@ -65,7 +65,7 @@ def check(folder: Path, text: str) -> None:
     [
         (SIM, 'base_link = "l0"', 'base_link = "lx"', "exoskeleton.base_link = 'lx' is not a link of armeo_spring.urdf"),
         (SIM, 'link = "l8"', 'link = "l99"', "cameras.r1.link = 'l99'"),
-        (SIM, "j3_length = 0.145", "j3_len = 0.145", 'has no joint "j3_len"'),
+        (SIM, "j3_length = 0.145", "j3_len = 0.145", "; did you mean j3_length?"),
         (SIM, SETTINGS, "settings_m = {}", "set its length in exoskeleton.settings_m.j3_length"),
         (SIM, "j3_length = 0.145", "j3_length = 5.0", "outside the limits"),
         (SIM, '"j1", "j2"', '"j1"', "add it to encoders.joints"),
