@@ -1,10 +1,12 @@
 """Commands whose help speaks of what is to be given, not of the types that it becomes; `-h` is `--help` everywhere."""
 
-from typing import Any
+from collections.abc import Callable
+from typing import Any, TypeVar
 
 import typer
 from typer.core import TyperArgument, TyperCommand, TyperGroup
 
+_Function = TypeVar("_Function", bound=Callable[..., Any])
 _HELP = {"help_option_names": ["-h", "--help"]}
 
 
@@ -25,7 +27,7 @@ class PlainTyper(typer.Typer):
         """Take what Typer takes."""
         super().__init__(cls=_PlainGroup, context_settings=_HELP, **settings)
 
-    def command(self, name: str | None = None, **settings: Any) -> Any:
+    def command(self, name: str | None = None, **settings: Any) -> Callable[[_Function], _Function]:
         """Do as Typer's decorator."""
         return super().command(name, cls=_PlainCommand, context_settings=_HELP, **settings)
 

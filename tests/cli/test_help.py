@@ -17,7 +17,7 @@ def _commands(command: Any, words: tuple[str, ...] = ()) -> Iterator[tuple[str, 
         yield from _commands(child, (*words, name))
 
 
-@pytest.mark.parametrize("words", _commands(get_command(app)), ids=" ".join)
+@pytest.mark.parametrize("words", list(_commands(get_command(app))), ids=" ".join)
 def test_it_speaks_of_what_is_to_be_given_and_not_of_types(words: tuple[str, ...]) -> None:
     told = CliRunner().invoke(app, [*words, "-h"], env={"COLUMNS": "100"})
     assert told.exit_code == 0
