@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 from ghest_rt.cli.main import app
 from ghest_rt.errors import BadInputError
-from ghest_rt.studies.figures.sensitivity import draw_further, draw_sobol
+from ghest_rt.studies.figures.sensitivity import draw_drift_by_method, draw_further, draw_sobol
 from ghest_rt.studies.figures.style import save_figure
 from ghest_rt.studies.sensitivity.parameters import further_parameters
 from ghest_rt.studies.sensitivity.sobol import sobol_parameters
@@ -67,3 +67,30 @@ def test_a_number_of_samples_that_sobol_cannot_use_is_refused(tmp_path: Path) ->
     arguments = ["study", "sensitivity", "--out", str(tmp_path), "--sobol-samples", "100"]
     with pytest.raises(BadInputError, match="power of two"):
         CliRunner().invoke(app, arguments, catch_exceptions=False)
+
+
+@pytest.mark.parametrize(
+    ("share", "half", "told"), [(0.1, 0.02, False), (-0.03, 0.02, False), (-0.2, 0.02, True), (0.1, 0.4, True)]
+)
+def test_sobol_indices_that_cannot_be_read_are_called_so(share: float, half: float, told: bool) -> None:
+    index = {"movement": "SFE", "parameter": "q1", "S1": share, "S1_conf": half, "ST": 0.2, "ST_conf": half}
+    figure = draw_sobol([{"output": output, **index} for output in ("position_m", "orientation_deg")], "SFE", 16)
+    assert ("too few samples to read" in figure.get_suptitle()) is told
+
+
+def test_drift_is_drawn_with_a_column_for_each_method_and_one_legend() -> None:
+    rows: list[dict[str, Any]] = [
+        {"movement": "SFE", "method": method, "group": "shift", "parameter": "q1", "amount": amount}
+        | {"position_m_rms": 0.5 * amount, "orientation_deg_rms": 100 * amount}
+        for method in ("paper", "refined", "fused")
+        for amount in (0.0, 0.01, 0.02)
+    ]
+    figure = draw_drift_by_method(rows, "sensor paper")
+    assert [axes.get_title().partition(":")[0] for axes in figure.axes] == ["paper", "refined", "fused"] * 2
+    (legend,) = figure.legends
+    assert [text.get_text() for text in legend.get_texts()] == [
+        "published, 3.6°",
+        "mean over movements and q1 to q6",
+        "least to greatest",
+        "the other methods' means",
+    ]

@@ -10,6 +10,8 @@ from ghest_rt.studies.paper_values import MEAN_RMSE_20_MM_DEG, PARAMETERS
 Row = dict[str, object]
 
 _S_LIMITS = (-1.0, 2.0)
+_NEGLIGIBLE = 0.05
+_WIDE = 0.2
 
 FIGURES = {"SAbAd": "14", "SFE": "15", "SIR": "16", "COMB": "17"}
 """The paper's figure of each movement."""
@@ -94,9 +96,10 @@ def _keep_within(axes: Any, limits: tuple[float, float]) -> str:
 
 
 def draw_drift_by_method(rows: Sequence[Row], of_what: str) -> Any:
-    """Return the arm's orientation and position error against marker translation, method by method.
+    """Return the arm's orientation and position error against marker translation: a column for each method.
 
-    The line is the mean over movements and q1 to q6, the band reaches from the least to the greatest of them.
+    The line is the mean over movements and q1 to q6, the band reaches from the least to the greatest of them; the means of the
+    other methods are drawn thin.
 
     Args:
         rows: Rows of a sensitivity analysis.
@@ -104,36 +107,53 @@ def draw_drift_by_method(rows: Sequence[Row], of_what: str) -> Any:
     """
     shifts = [r for r in rows if r["group"] == "shift"]
     methods = list(dict.fromkeys(cast(str, r["method"]) for r in shifts))
-    amounts = sorted({cast(float, r["amount"]) for r in shifts})
-    figure = new_figure(7.2, 3.3)
-    panels = figure.subplots(1, 2)
-    for axes, (column, title, label, scale) in zip(panels, _PANELS[1::-1], strict=True):
-        for method in methods:
-            groups = [
-                [
-                    scale * cast(float, r[column])
-                    for r in shifts
-                    if r["method"] == method and r["amount"] == amount and r[column] is not None
-                ]
-                for amount in amounts
-            ]
-            x = [1e3 * amount for amount, values in zip(amounts, groups, strict=True) if values]
-            known = [values for values in groups if values]
+    figure = new_figure(7.2, 5.0)
+    panels = figure.subplots(2, len(methods), sharex=True, sharey="row", squeeze=False)
+    for line, (column, title, label, scale) in zip(panels, _PANELS[1::-1], strict=True):
+        curves = {method: _spread(shifts, method, column, scale) for method in methods}
+        for axes, method in zip(line, methods, strict=True):
+            for other, (x, _, mean, _) in curves.items():
+                if other != method:
+                    axes.plot(x, mean, color=METHOD_COLORS[other], linewidth=0.8, linestyle="--")
+            x, least, mean, greatest = curves[method]
             color = METHOD_COLORS[method]
-            axes.fill_between(x, [min(v) for v in known], [max(v) for v in known], color=color, alpha=0.15, linewidth=0)
-            axes.plot(x, [sum(v) / len(v) for v in known], color=color, marker="o", markersize=3, label=f"method {method}")
-        axes.set_title(title.partition(") ")[2])
-        axes.set_xlabel("translation of the marker (mm)")
-        axes.set_ylabel(label)
-        axes.set_ylim(bottom=0.0)
-    panels[0].plot(
-        20.0, MEAN_RMSE_20_MM_DEG, marker="*", markersize=11, color="black", linestyle="none", label="published, 3.6°"
-    )
-    handles, labels = panels[0].get_legend_handles_labels()
+            axes.fill_between(x, least, greatest, color=color, alpha=0.2, linewidth=0)
+            axes.plot(x, mean, color=color, marker="o", markersize=3)
+            axes.set_title(f"{method}: {title.partition(') ')[2]}", fontsize=8.5)
+        line[0].set_ylabel(label)
+        line[0].set_ylim(bottom=0.0)
+    for axes in panels[-1]:
+        axes.set_xlabel("translation (mm)")
+    if "paper" in methods:
+        panels[0][methods.index("paper")].plot(
+            20.0, MEAN_RMSE_20_MM_DEG, marker="*", markersize=11, color="black", linestyle="none", label="published, 3.6°"
+        )
+    last = panels[0][0]
+    last.plot([], [], color="0.4", marker="o", markersize=3, label="mean over movements and q1 to q6")
+    last.fill_between([], [], color="0.4", alpha=0.2, label="least to greatest")
+    last.plot([], [], color="0.4", linewidth=0.8, linestyle="--", label="the other methods' means")
+    handles, labels = last.get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=len(labels), frameon=False)
     movements = ", ".join(dict.fromkeys(cast(str, r["movement"]) for r in shifts))
-    figure.suptitle(f"{movements}: {of_what}", fontsize=9)
+    figure.suptitle(f"Marker displaced: {movements}: {of_what}", fontsize=9)
     return figure
+
+
+def _spread(
+    shifts: Sequence[Row], method: str, column: str, scale: float
+) -> tuple[list[float], list[float], list[float], list[float]]:
+    """Return the amounts in millimetres at which something is known of a method, and least, mean and greatest error there."""
+    by_amount: dict[float, list[float]] = {}
+    for row in shifts:
+        if row["method"] == method and row[column] is not None:
+            by_amount.setdefault(cast(float, row["amount"]), []).append(scale * cast(float, row[column]))
+    known = sorted(by_amount.items())
+    return (
+        [1e3 * amount for amount, _ in known],
+        [min(values) for _, values in known],
+        [sum(values) / len(values) for _, values in known],
+        [max(values) for _, values in known],
+    )
 
 
 _GROUPS = {
@@ -207,7 +227,18 @@ def draw_sobol(rows: Sequence[Row], movement: str, samples: int) -> Any:
         axes.set_xlabel("share of the variance (dimensionless)")
         axes.grid(axis="y", visible=False)
     panels[0].invert_yaxis()
-    figure.suptitle(f"{movement}, {samples} base samples; lines: 95 % confidence intervals", fontsize=9)
+    unclear = _too_few(chosen)
+    warning = f"\ntoo few samples to read: {unclear}" if unclear else ""
+    figure.suptitle(f"{movement}, {samples} base samples; lines: 95 % confidence intervals{warning}", fontsize=9)
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=2, frameon=False)
     return figure
+
+
+def _too_few(rows: Sequence[Row]) -> str:
+    """Say why indices cannot be read, or ""; with samples enough no share is negative beyond its confidence interval's half."""
+    known = [row for row in rows if row["ST"] is not None]
+    negative = sum(cast(float, row[column]) < -_NEGLIGIBLE for row in known for column in ("S1", "ST"))
+    wide = sum(cast(float, row["ST_conf"]) > _WIDE for row in known)
+    told = [f"{negative} shares negative" if negative else "", f"{wide} intervals wider than ± {_WIDE:g}" if wide else ""]
+    return ", ".join(text for text in told if text)
