@@ -21,7 +21,7 @@ from ghest_rt.geometry.so3 import Array
 _ITERATIONS = 50
 _TUKEY = 4.685  # 95 % as efficient as least squares where errors are normal
 _NORMAL_NORM_MEDIAN = 1.5382  # median length of a standard normal vector in three dimensions
-_LEAST_SCALE_M = 1e-5  # below this it is rounding
+_LEAST_SCALE_M = 0.001  # skin and mounts do that much; nothing below eight times as much is an outlier
 _CONVERGED_M = 1e-9
 _LEAST_INSTANTS = 10
 _LEAST_EIGENVALUE = 1e-6  # a spread of 0.08 degrees

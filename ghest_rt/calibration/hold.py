@@ -19,7 +19,7 @@ STILL_M = 0.005
 
 _STEP_S = 0.25
 _LEAST_INSTANTS = 30
-_WAY_OFF = 2.0  # times STILL_RAD: where the newest part of a hold is, it has ended
+_ENDING_S = 0.5  # a movement begins slowly: the last of a hold is left out where enough remains
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,7 +53,8 @@ def find_hold(session: Session) -> Hold | None:
     while start_s <= BEGINS_WITHIN_S:
         hold = _held(session, start_s, start_s + LEAST_S)
         if hold is not None:
-            return _as_long_as_it_lasts(session, hold)
+            whole = _as_long_as_it_lasts(session, hold)
+            return _held(session, whole.start_s, max(whole.end_s - _ENDING_S, hold.end_s)) or whole
         start_s += _STEP_S
     return None
 
@@ -65,7 +66,7 @@ def _as_long_as_it_lasts(session: Session, hold: Hold) -> Hold:
         if newest is None or longer is None:
             return hold
         for mean, now in ((hold.e_from_m0, newest.e_from_m0), (hold.e_from_m1, newest.e_from_m1)):
-            if _angle_rad(mean, now[None])[0] > _WAY_OFF * STILL_RAD:
+            if _angle_rad(mean, now[None])[0] > STILL_RAD:
                 return hold
         hold = longer
 
