@@ -9,7 +9,20 @@ from typing import Any
 
 from rich.console import Console
 
-from benchmarks import bound, encoder_path, filter_tick, flood, footprint, imaging, loop, pose, recording, throughput, tick
+from benchmarks import (
+    bound,
+    encoder_path,
+    filter_tick,
+    flood,
+    footprint,
+    imaging,
+    loop,
+    pose,
+    recording,
+    supervision,
+    throughput,
+    tick,
+)
 from benchmarks.plot import draw
 
 _OUT = Path(__file__).resolve().parents[1] / "out" / "benchmarks"
@@ -26,6 +39,7 @@ _BENCHMARKS: dict[str, Callable[[bool], dict[str, Any]]] = {
     "footprint": footprint.run,
     "encoders": encoder_path.run,
     "recording": recording.run,
+    "supervision": supervision.run,
 }
 
 
