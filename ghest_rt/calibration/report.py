@@ -62,7 +62,10 @@ def notes_of(found: Found) -> list[str]:
         f"elbow along the arm: {found.length.source}; the angles do not depend on it",
     ]
     if found.pivot is None or found.pivot_off_rad is None:
-        notes.append("the elbow has hardly moved: whether the arm was in the neutral posture is judged by the forearm alone")
+        notes.append(
+            "the exoskeleton's elbow could not be made out (the elbow has hardly moved, or about one axis alone): whether the arm "
+            "was in the neutral posture is judged by the forearm alone"
+        )
     else:
         apart = np.linalg.norm(found.pivot.second_m - found.m1_from_elw[:3, 3])
         notes.append(

@@ -55,8 +55,8 @@ class Found:
         m0_from_gh: (4, 4) GH frame in m0.
         m1_from_elw: (4, 4) elbow frame in m1.
         length: The upper arm.
-        elbow_in_link_m: (3,) elbow in the link of camera r1 in the neutral posture, and (3,) how far it strayed there.
-        elbow_in_link_sigma_m: Its standard deviations.
+        elbow_in_link_m: (3,) elbow in the link of camera r1 in the neutral posture.
+        elbow_in_link_sigma_m: (3,) how far it strayed there.
         forearm_twist_rad: Forearm out of the elbow frame's y-z plane in the neutral posture; None where it is not known.
         forearm_twist_sigma_rad: How much it strayed there; None where it is not known.
         elbow_bend_rad: Angle between upper arm and forearm in the neutral posture, 0 stretched; None where it is not known.
@@ -105,17 +105,19 @@ def solve(session: Session, hold: Hold, old: Calibration, elbow_from: ElbowFrom,
     if elbow_from == "exoskeleton":
         if pivot is None:
             raise BadInputError(
-                "--elbow exoskeleton: the elbow has hardly moved, so that its axis is unknown; "
-                "bend and stretch it by 30° or more at the end of the session, or leave this option out"
+                "--elbow exoskeleton: the elbow has hardly moved, or about one axis alone, so that its centre is unknown; "
+                "bend and stretch it by 25° both ways at the end of the session, or leave this option out"
             )
-        elbow_m = pivot.second_m
-        along = (gh.second_m - elbow_m) / np.linalg.norm(gh.second_m - elbow_m)
+        along = gh.second_m - pivot.second_m
+        pivot_length_m = float(np.linalg.norm(along))
+        along /= pivot_length_m
         m1_from_elw_rotation = _with_y(m1_from_elw_rotation, along)
-        apart_m = float(np.linalg.norm(gh.second_m - elbow_m))
-        length = ArmLength(apart_m, _along_m(pivot, along), "exoskeleton's elbow")
+        length = ArmLength(pivot_length_m, _along_m(pivot, along), "exoskeleton's elbow")
+        if arm_length_m is not None:
+            length = ArmLength(arm_length_m, TAPE_M, "given (--arm-length)")
     else:
         length = _length(gh, pivot, along, old, arm_length_m)
-        elbow_m = gh.second_m - length.metres * along
+    elbow_m = gh.second_m - length.metres * along
     m1_from_elw = transform(m1_from_elw_rotation, elbow_m)
     m0_from_gh = transform(hold.e_from_m0.T, gh.first_m)
     in_link_m, in_link_sigma_m = _elbow_in_link(session, hold, elbow_m)

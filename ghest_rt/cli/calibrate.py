@@ -1,5 +1,6 @@
 """`ghest-rt calibrate`: a recorded calibration session makes a new station file."""
 
+import logging
 import math
 from dataclasses import asdict
 from pathlib import Path
@@ -18,6 +19,8 @@ from ghest_rt.config.load import LoadedStation, load_station
 from ghest_rt.errors import BadInputError
 from ghest_rt.extras import need_extra
 from ghest_rt.recording.reader import Recording
+
+_log = logging.getLogger(__name__)
 
 _PICTURES = (".png", ".svg", ".pdf")
 _AXES = ("flexion", "abduction", "rotation")
@@ -55,6 +58,8 @@ def calibrate_recording(
         arm_length_m=arm_length_m,
     )
     session = _read(recording, station)
+    for problem in recording.problems:
+        _log.warning("%s: %s", path, problem)
     outcome = calibrate(session, station, options)
     if picture is not None and outcome.found is not None:
         from ghest_rt.calibration.picture import draw_calibration  # noqa: PLC0415 - an extra, imported only when used

@@ -73,6 +73,10 @@ def test_the_exoskeletons_elbow_gives_the_arms_axis_if_asked_for(station: Loaded
     off_deg = [math.degrees(np.linalg.norm(axis - M1_FROM_ELW[:3, 1])) for axis in along]
     assert off_deg[0] == pytest.approx(4.0, abs=0.1)
     assert off_deg[1] < 0.2
+    measured = calibrate(tilted, station, replace(OPTIONS, elbow_from="exoskeleton", arm_length_m=0.29)).calibration
+    assert measured is not None
+    assert measured.arm_length_m == 0.29
+    assert np.array(measured.m1_from_elw)[:3, 1] == pytest.approx(along[1])
 
 
 def scaled(a: float = 1.0, b: float = 1.0, g: float = 1.0) -> Session:
