@@ -130,7 +130,7 @@ def run(quick: bool) -> dict[str, Any]:
                     line[method] = "not found in every frame" if found is None else _text(*found)
                     curves[method].append(np.nan if found is None else found[0])
                 ratios[sensor].append(curves["photometric"][-1] / curves["bound"][-1])
-                results[f"{sensor}, {distance_m:.2f} m, tilt {tilt_deg:.0f} deg"] = line
+                results[f"{sensor}, {distance_m:.2f} m, tilt {tilt_deg:.0f}°"] = line
             _draw(axes[row][column], distances_m, curves, f"{sensor} sensor, tilt {tilt_deg:.0f}°")
     for sensor, values in ratios.items():
         results[f"photometric / bound, orientation, {sensor}: mean and greatest"] = (
@@ -143,7 +143,7 @@ def run(quick: bool) -> dict[str, Any]:
 
 
 def _text(rotation_deg: float, position_mm: float) -> str:
-    return f"{rotation_deg:.4f} deg {position_mm:.4f} mm"
+    return f"{rotation_deg:.4f}° {position_mm:.4f} mm"
 
 
 def _draw(axis: Any, distances_m: tuple[float, ...], curves: dict[str, list[float]], title: str) -> None:

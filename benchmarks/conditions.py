@@ -26,7 +26,7 @@ class Condition:
 
     Attributes:
         group: What it belongs to.
-        name: What is special about it.
+        name: What is special about it; names its calibration session too, so that another name is another session.
         options: What to simulate; the seed is still open.
         vision: Which detectors see it.
     """
@@ -35,6 +35,18 @@ class Condition:
     name: str
     options: SimulateOptions
     vision: Method = "photometric"
+
+    @property
+    def title(self) -> str:
+        """The name in words."""
+        options = self.options
+        if self.group == "plain":
+            parts = [f"{options.movement}, sensor {options.sensor}"]
+            parts += [f"detectors {self.vision}"] if self.vision != "photometric" else []
+            parts += ["left arm"] if options.arm == "left" else []
+            return ", ".join(parts)
+        words = self.name.replace(" deg", "°").replace("@", ", from ")
+        return f"{words} s" if "@" in self.name else words
 
     def seeded(self, seed: int) -> SimulateOptions:
         """Return what to simulate with a seed."""

@@ -12,13 +12,13 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 
-import matplotlib as mpl
 import numpy as np
 from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
 from benchmarks.conditions import HELD_OUT_SEEDS, TUNING_SEEDS, Condition, conditions
+from benchmarks.consistency_picture import HISTOGRAM_EDGES, draw
 from benchmarks.filter_tick import estimator_for
 from benchmarks.observed import estimates, observed
 from benchmarks.scenes import FOLDER
@@ -28,9 +28,6 @@ from ghest_rt.estimation.fused.estimator import FusedEstimator
 from ghest_rt.estimation.uncertainty import euler_sigma_rad
 from ghest_rt.geometry.so3 import Array, log_so3
 from ghest_rt.messages.results import MarkerObservation, Status
-
-mpl.use("Agg")
-import matplotlib.pyplot as plt
 
 _QUANTILE = 1.959964
 
@@ -138,8 +135,9 @@ def main() -> None:
     summary = {"seeds": list(seeds), "reference": arguments.reference, **_summary(found)}
     console.print_json(data=summary)
     FOLDER.mkdir(parents=True, exist_ok=True)
-    (FOLDER / "consistency.json").write_text(json.dumps(summary, indent=2) + "\n")
-    draw(found)
+    drawn = {"conditions": _conditions(found), "histograms": _histograms(found)}
+    (FOLDER / "consistency.json").write_text(json.dumps({**summary, **drawn}, indent=2) + "\n")
+    draw(**drawn, out=FOLDER / "consistency.png")
     console.print(f"picture: {FOLDER / 'consistency.png'}")
 
 
@@ -167,7 +165,7 @@ def _summary(found: list[Judged]) -> dict[str, object]:
 
 def _table(found: list[Judged]) -> Table:
     angles = ("flexion, %", "abduction, %", "rotation, %")
-    table = Table("group", "condition", "RMS, deg", "NEES / 3", "NIS / 6", *angles, "valid, %")
+    table = Table("group", "condition", "RMS, °", "NEES / 3", "NIS / 6", *angles, "valid, %")
     for (group, name), members in _by_condition(found).items():
         inside = 100.0 * np.concatenate([j.inside for j in members]).mean(axis=0)
         table.add_row(
@@ -182,34 +180,26 @@ def _table(found: list[Judged]) -> Table:
     return table
 
 
-def draw(found: list[Judged]) -> None:
-    """Draw coverage by condition, and the distributions of NEES and NIS of undisturbed sessions beside what they should be."""
-    grouped = _by_condition(found)
-    figure, (left, middle, right) = plt.subplots(
-        1, 3, figsize=(15, max(4.0, 0.21 * len(grouped) + 1.5)), width_ratios=(2.2, 1, 1), layout="constrained"
-    )
-    rows = np.arange(len(grouped))[::-1]
-    left.axvspan(93, 97, color="tab:green", alpha=0.25, label="93 to 97 %")
-    for axis, (name, mark) in enumerate((("flexion", "o"), ("abduction", "s"), ("rotation", "^"))):
-        shares = [100.0 * np.concatenate([j.inside for j in members])[:, axis].mean() for members in grouped.values()]
-        left.plot(shares, rows, mark, ms=4, label=name)
-    left.set_yticks(rows, [f"{group}: {name}" for group, name in grouped], fontsize=7)
-    left.set(xlabel="95 % intervals that hold the truth, %", xlim=(-2, 102), title="Coverage by condition")
-    left.grid(alpha=0.3)
-    left.legend(fontsize=8, loc="lower left")
+def _conditions(found: list[Judged]) -> list[dict[str, object]]:
+    """Return the coverage of every condition, as JSON takes it."""
+    return [
+        {
+            "group": group,
+            "title": members[0].condition.title,
+            "coverage_percent": (100.0 * np.concatenate([j.inside for j in members]).mean(axis=0)).round(2).tolist(),
+        }
+        for (group, _), members in _by_condition(found).items()
+    ]
+
+
+def _histograms(found: list[Judged]) -> dict[str, list[float]]:
+    """Return how NEES and NIS of the undisturbed sessions, or of all if there is none, are distributed."""
     plain = [j for j in found if j.condition.group == "plain"] or found
-    x = np.linspace(0.01, 20.0, 400)
-    nees, nis = (np.concatenate([getattr(j, name) for j in plain]) for name in ("nees", "nis"))
-    for axes, name, values, density in (
-        (middle, "NEES, 3 degrees of freedom", nees, np.sqrt(x / (2 * np.pi)) * np.exp(-x / 2)),
-        (right, "NIS, 6 degrees of freedom", nis, x**2 * np.exp(-x / 2) / 16.0),
-    ):
-        axes.hist(np.minimum(values, 20.0), bins=60, range=(0, 20), density=True, alpha=0.5, label="undisturbed sessions")
-        axes.plot(x, density, "k", lw=1, label="chi-squared")
-        axes.set(title=name, xlabel="value (all above 20 in the last bin)", yticks=[])
-        axes.legend(fontsize=8)
-    figure.savefig(FOLDER / "consistency.png", dpi=110)
-    plt.close(figure)
+    values = {"nees": np.concatenate([j.nees for j in plain]), "nis": np.concatenate([j.nis for j in plain])}
+    return {
+        name: np.histogram(np.minimum(of, HISTOGRAM_EDGES[-1]), HISTOGRAM_EDGES, density=True)[0].round(5).tolist()
+        for name, of in values.items()
+    }
 
 
 if __name__ == "__main__":

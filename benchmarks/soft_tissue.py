@@ -56,7 +56,7 @@ def main() -> None:
     parser.add_argument("--reference", action="store_true", help="station files with [calibration.reference]")
     arguments = parser.parse_args()
     seeds = [int(seed) for seed in arguments.seeds.split(",")]
-    table = Table("movement", "method", "rotation, RMS deg", "flexion", "abduction", "internal rotation")
+    table = Table("movement", "method", "rotation, RMS °", "flexion", "abduction", "internal rotation")
     rows = []
     for movement in _MOVEMENTS:
         sessions = [judged(movement, seed, arguments.duration, reference=arguments.reference) for seed in seeds]
