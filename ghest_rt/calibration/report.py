@@ -63,8 +63,8 @@ def notes_of(found: Found) -> list[str]:
     ]
     if found.pivot is None or found.pivot_off_rad is None:
         notes.append(
-            "the exoskeleton's elbow could not be made out (the elbow has hardly moved, or about one axis alone): whether the arm "
-            "was in the neutral posture is judged by the forearm alone"
+            "the exoskeleton's elbow could not be made out (the elbow has hardly moved, or about one axis alone): whether the "
+            "arm was in the neutral posture is judged by the forearm alone"
         )
     else:
         apart = np.linalg.norm(found.pivot.second_m - found.m1_from_elw[:3, 3])
