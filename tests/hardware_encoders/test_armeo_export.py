@@ -11,10 +11,10 @@ from ghest_drivers.hardware.encoders.armeo_export import ArmeoSettings, armeo_li
 from ghest_drivers.hardware.encoders.channels import Channel
 from ghest_drivers.hardware.encoders.stats import LinkStats, Rejection
 from ghest_drivers.interfaces import EncoderLink
+from tests.real_data import real_files
 
 MS = 1_000_000
 DEG = np.pi / 180
-REAL = Path(__file__).parents[3] / "shared" / "armeo_recordings"
 
 EXPORT = """Timestamp; Inner Shoulder; Elbow; Grip
 23:59:59.970; 1.0; -10.000; 0.1;
@@ -104,10 +104,9 @@ def test_a_missing_column_is_told_with_those_there_are(export: Path) -> None:
         read_armeo_export(export, ("Wrist",), LinkStats())
 
 
-@pytest.mark.skipif(not REAL.is_dir(), reason="the real exports in ../shared/armeo_recordings are not here")
 async def test_real_exports_load_with_their_real_timing() -> None:
     periods, rows, repeated = [], 0, 0
-    files = sorted(REAL.glob("*.csv"))
+    files = real_files("armeo_recordings/*.csv")
     for path in files:
         stats = LinkStats()
         data = read_armeo_export(path, ("x", "z"), stats)

@@ -11,10 +11,10 @@ from ghest_rt.geometry.so3 import rot_x, rot_y, rot_z
 from ghest_rt.simulation.opensim_file import read_motion_table
 from ghest_rt.simulation.opensim_motion import E_FROM_OPENSIM, OpenSimMotion
 from ghest_rt.simulation.therapy import MOVEMENTS, TherapyMotion, find_movement
+from tests.real_data import real_files
 
 TABLE_2 = {"SAbAd": ((6, 31, 10), 1000), "SFE": ((31, 8, 1), 1000), "SIR": ((3, 3, 34), 1000), "COMB": ((40, 90, 60), 2000)}
 COLUMNS = "time clav_prot clav_elev scapula_upward_rot plane_elv shoulder_elv axial_rot elbow_flexion"
-RECORDED = Path(__file__).parents[3] / "shared" / "human_motion"
 
 
 @pytest.mark.parametrize("name", TABLE_2)
@@ -142,10 +142,7 @@ def test_missing_or_binary_motion_files_and_missing_columns_are_told(tmp_path: P
 
 
 def test_recorded_movements_of_real_people_go_from_hanging_to_overhead() -> None:
-    files = sorted(RECORDED.glob("[AF]*.mot"))
-    if not files:
-        pytest.skip("the recorded movements are not here")
-    for path in files:
+    for path in real_files("human_motion/[AF]*.mot"):
         motion = OpenSimMotion(read_motion_table(path), path.stem)
         height = [-(p.scapula @ p.gh)[0, 2] for p in (motion.at(t) for t in np.arange(0.0, motion.duration_s, 0.25))]
         assert height[0] < -0.9
