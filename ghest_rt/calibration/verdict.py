@@ -69,7 +69,7 @@ def object_to_view(session: Session) -> list[Objection]:
     text = (
         f"both markers are known during {100 * session.seen_fraction:.0f} % of the session only, {len(session.t_s)} samples"
         f"{f' (missing: {reasons})' if reasons else ''}; at least {100 * LEAST_SEEN:.0f} % and {LEAST_SEEN_S:g} s are needed: "
-        "look at both cameras' views (`ghest-rt picture`, `ghest-rt doctor`) and record again"
+        "look at both cameras' views (`ghest-rt doctor --live 5`, Foxglove) and record again"
     )
     return [Objection(Refusal.SEEN_TOO_SELDOM, text)]
 

@@ -104,7 +104,7 @@ def test_a_session_in_which_nothing_is_seen_writes_nothing(folder: Path) -> None
     done = run(blank, "--station", folder / "station-sim.toml", "--out", folder / "new.toml")
     assert done.returncode == 2
     assert "not good enough to calibrate by" in done.stderr
-    assert "ghest-rt picture" in done.stderr
+    assert "ghest-rt doctor" in done.stderr
     assert not (folder / "new.toml").exists()
 
 
