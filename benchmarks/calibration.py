@@ -17,7 +17,9 @@ from rich.console import Console
 from rich.table import Table
 
 from benchmarks.scenes import FOLDER
-from ghest_rt.calibration.calibrate import CalibrationOptions, calibrate
+from ghest_rt.calibration.arm_axis import ArmAxis
+from ghest_rt.calibration.calibrate import calibrate
+from ghest_rt.calibration.options import CalibrationOptions
 from ghest_rt.calibration.session import session_of
 from ghest_rt.calibration.station_text import rigid_rows
 from ghest_rt.config.load import LoadedStation
@@ -132,7 +134,7 @@ def run(sensor: str, seed: int, duration_s: float, soft_tissue: str, *, wrong_mo
         "true": right,
         "spoilt": bad,
         "calibrated": calibrated(session, bad, CalibrationOptions(calibration_id="new")),
-        _VARIANTS[3]: calibrated(session, bad, CalibrationOptions(calibration_id="new", elbow_from="exoskeleton")),
+        _VARIANTS[3]: calibrated(session, bad, CalibrationOptions(calibration_id="new", elbow_from=ArmAxis.EXOSKELETON)),
     }
     return {name: judged(later, station, length_m) for name, station in stations.items() if station is not None}
 

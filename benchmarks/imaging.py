@@ -107,11 +107,11 @@ def run(quick: bool) -> dict[str, Any]:
             line: dict[str, str] = {}
             for method in METHODS:
                 given = scenes["aruco" if method == "aruco" else "disks"]
-                found, nees = errors(method, given)
-                rms[method].append(np.sqrt(np.mean(found**2, axis=0)) if len(found) else np.full(2, np.nan))
+                seen, nees = errors(method, given)
+                rms[method].append(np.sqrt(np.mean(seen**2, axis=0)) if len(seen) else np.full(2, np.nan))
                 line[method] = "{:.4f}° {:.4f} mm".format(*rms[method][-1])
                 line[method] += f", NEES {np.mean(nees):.1f}" if nees else ""
-                line[method] += f", {len(given) - len(found)} not found" if len(found) < len(given) else ""
+                line[method] += f", {len(given) - len(seen)} not found" if len(seen) < len(given) else ""
             results[f"{sensor}, {case}"] = line
         found[sensor] = rms
     _OUT.parent.mkdir(parents=True, exist_ok=True)

@@ -1,7 +1,8 @@
 """What it costs to have a camera's driver in a process of its own: two streams of 640x480 RGB-D at 60 Hz."""
 
-import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
 from typing import Any
 
 import numpy as np
@@ -55,18 +56,14 @@ def run(quick: bool) -> dict[str, Any]:
             frame = camera.read(1.0)
             delays_s.append((clock.now_ns() - frame.t_arrival_ns) * 1e-9)
 
-    for camera in cameras:
-        camera.open()
-    begun_s, cpu_s = time.monotonic(), time.process_time()
-    end_s = begun_s + seconds
-    readers = [threading.Thread(target=read, args=(camera,)) for camera in cameras]
-    for reader in readers:
-        reader.start()
-    for reader in readers:
-        reader.join()
-    share = (time.process_time() - cpu_s) / (time.monotonic() - begun_s)
-    for camera in cameras:
-        camera.close()
+    with ExitStack() as stack, ThreadPoolExecutor(len(cameras)) as pool:
+        for camera in cameras:
+            stack.callback(camera.close)
+            camera.open()
+        begun_s, cpu_s = time.monotonic(), time.process_time()
+        end_s = begun_s + seconds
+        list(pool.map(read, cameras))
+        share = (time.process_time() - cpu_s) / (time.monotonic() - begun_s)
     return {
         "streams": f"{len(cameras)} of {_SHAPE[1]}x{_SHAPE[0]} at {_RATE_HZ:g} Hz",
         "frames": len(delays_s),

@@ -2,6 +2,7 @@
 
 GhestError (1)
 ├── BadInputError (2)     config, URDF, recording, motion file: names the place and the remedy
+│   └── NotPermittedError file or folder that this user may not look at
 └── DeviceError (3)       a device that is missing or lost
 """
 
@@ -18,6 +19,10 @@ class BadInputError(GhestError):
     """A file or value given by the user cannot be used; the text says where and what to do."""
 
     exit_code: ClassVar[int] = 2
+
+
+class NotPermittedError(BadInputError):
+    """This user may not look at a file, so that nothing can be said of it: another user's service may be able to use it."""
 
 
 class DeviceError(GhestError):

@@ -2,6 +2,7 @@
 
 import importlib.metadata
 import json
+import shlex
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -29,16 +30,17 @@ def requirement(origin: dict[str, Any] | None, extra: str) -> str:
     """
     extras = f"[{extra}]" if extra else ""
     if origin is None:
-        return f"'{_DISTRIBUTION}{extras}'"
+        return shlex.quote(f"{_DISTRIBUTION}{extras}")
     url = str(origin.get("url", ""))
     if "dir_info" in origin and urlsplit(url).scheme == "file":
         folder = Path(unquote(urlsplit(url).path))
         if not (folder / "pyproject.toml").is_file():
             return f"'/path/to/{_DISTRIBUTION}{extras}'"
-        return f"{'-e ' if origin['dir_info'].get('editable') else ''}'{folder}{extras}'"
+        return ("-e " if origin["dir_info"].get("editable") else "") + shlex.quote(f"{folder}{extras}")
     repository = origin.get("vcs_info")
     source = f"{repository['vcs']}+{url}@{repository['commit_id']}" if repository else url
-    return f"'{_DISTRIBUTION}{extras} @ {source}'"
+    below = f"#subdirectory={origin['subdirectory']}" if origin.get("subdirectory") else ""
+    return shlex.quote(f"{_DISTRIBUTION}{extras} @ {source}{below}")
 
 
 @cache

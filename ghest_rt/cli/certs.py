@@ -9,6 +9,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
+from ghest_rt.cli.console import printing
 from ghest_rt.cli.options import Json
 from ghest_rt.cli.plain import PlainTyper
 from ghest_rt.extras import need_extra
@@ -112,7 +113,8 @@ def list_identities(pki: _Pki = _DEFAULT_PKI, as_json: Json = False) -> None:
     for entry in authority.issued():
         left = (entry.expires - now).days
         table.add_row(entry.common_name, entry.state(now), f"{entry.expires:%Y-%m-%d}", str(left), ", ".join(entry.hosts))
-    Console().print(table)
+    with printing():
+        Console().print(table)
 
 
 @app.command()

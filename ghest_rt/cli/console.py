@@ -2,12 +2,12 @@
 
 import json
 import logging
+import math
+import numbers
 import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-
-import numpy as np
 
 from ghest_rt.cli.journal import journal_handler
 from ghest_rt.errors import GhestError
@@ -68,9 +68,10 @@ def _plain(value: object) -> object:
         return {str(key): _plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
         return [_plain(item) for item in value]
-    if isinstance(value, float | np.floating):
-        number = float(value)
-        return number if np.isfinite(number) else None
-    if isinstance(value, np.integer):
+    # NumPy's numbers, too, are registered there.
+    if isinstance(value, bool) or not isinstance(value, numbers.Real):
+        return value
+    if isinstance(value, numbers.Integral):
         return int(value)
-    return value
+    number = float(value)
+    return number if math.isfinite(number) else None

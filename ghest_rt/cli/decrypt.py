@@ -18,7 +18,7 @@ def decrypt(sealed: Sequence[Path], key: Path, out: Path | None) -> None:
 
     Raises:
         BadInputError: A file is not sealed, not for this key or not readable; a restored file exists already; or a file was cut
-            off or changed: then all that comes before is restored, and every other file, before this is raised.
+            off or changed: then all that comes before is restored. Every other file is restored before this is raised.
         GhestError: The extra `security` is not installed.
     """
     need_extra("security", "a sealed recording")
@@ -26,23 +26,27 @@ def decrypt(sealed: Sequence[Path], key: Path, out: Path | None) -> None:
 
     keys = load_keys(key)
     paths = [path for given in sealed for path in _files(given)]
-    broken: list[str] = []
+    wrong: list[str] = []
     columns = (TextColumn("{task.description}"), BarColumn(), DownloadColumn(), TimeRemainingColumn())
     console = Console(stderr=True)
     with Progress(*columns, console=console, disable=not console.is_terminal, transient=True) as bar:
         for path in paths:
             name = path.name.removesuffix(SEALED_SUFFIX)
             folder = path.parent if out is None else out
-            folder.mkdir(parents=True, exist_ok=True)
-            if name == path.name and folder == path.parent:
-                raise BadInputError(f"{path}: does not end in {SEALED_SUFFIX}; if it is sealed, name a folder with --out")
-            task = bar.add_task(path.name, total=path.stat().st_size)
-            restored = unseal(path, folder / name, keys, partial(_advance, bar, task))
+            try:
+                folder.mkdir(parents=True, exist_ok=True)
+                if name == path.name and folder == path.parent:
+                    raise BadInputError(f"{path}: does not end in {SEALED_SUFFIX}; if it is sealed, name a folder with --out")
+                task = bar.add_task(path.name, total=path.stat().st_size)
+                restored = unseal(path, folder / name, keys, partial(_advance, bar, task))
+            except BadInputError as error:
+                wrong.append(str(error))
+                continue
             typer.echo(f"{restored.path}: {restored.size_bytes / 1e6:.1f} MB")
             if not restored.whole:
-                broken.append(f"{path}: cut off or changed; {restored.path} holds what comes before, and can be read")
-    if broken:
-        raise BadInputError("\n".join(broken))
+                wrong.append(f"{path}: cut off or changed; {restored.path} holds what comes before, and can be read")
+    if wrong:
+        raise BadInputError("\n".join(wrong))
 
 
 def recording_key(out: Path) -> None:

@@ -11,6 +11,7 @@ from rich.console import Console
 
 from ghest_drivers.replay import ReplayPlayer
 from ghest_drivers.samples import CameraInfo, EncoderInfo
+from ghest_rt.cli.console import printing
 from ghest_rt.cli.live import LiveFacts, LiveView
 from ghest_rt.cli.options import Method
 from ghest_rt.cli.publishing import Publishing
@@ -105,7 +106,8 @@ def replay_path(options: ReplayOptions) -> None:
             if stop.is_set() or not options.loop:
                 break
             del reports[: -len(recordings)]  # a display that runs for days tells of the last round
-    print_reports(Console(), reports, options.as_json)
+    with printing():
+        print_reports(Console(), reports, options.as_json)
 
 
 class _Replayer:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from rich.console import Console
 
+from ghest_rt.cli.console import printing
 from ghest_rt.cli.live import LiveFacts, LiveView
 from ghest_rt.cli.options import Method, Movement
 from ghest_rt.cli.publishing import Publishing
@@ -123,9 +124,11 @@ def run_station(options: RunOptions) -> None:
                 recording.output.attach(service)
             summary = run_service(service, stop, options.duration_s)
     counts = recording.counts() if recording is not None else None
-    print_reports(Console(), [report_of(config.station.id, method, summary, scoreboard)], options.as_json, counts)
+    with printing():
+        print_reports(Console(), [report_of(config.station.id, method, summary, scoreboard)], options.as_json, counts)
     if world is not None and world.slowness and not options.as_json:
-        Console().print(f"{config.station.id}: {world.slowness}", highlight=False)
+        with printing():
+            Console().print(f"{config.station.id}: {world.slowness}", highlight=False)
     if counts is not None and counts.failure:
         raise GhestError(f"the recording is not complete: {counts.failure}")
     if options.duration_s is not None and world is None and not stop.is_set():

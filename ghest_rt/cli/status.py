@@ -9,7 +9,7 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
-from ghest_rt.cli.console import print_json
+from ghest_rt.cli.console import print_json, printing
 from ghest_rt.cli.station_watch import StationState, StationWatch
 from ghest_rt.errors import DeviceError
 from ghest_rt.messages.published import Health, InputState
@@ -48,7 +48,8 @@ def show_status(
     if as_json:
         print_json(document(stations, now_s))
     else:
-        Console().print(page(stations, now_s))
+        with printing():
+            Console().print(page(stations, now_s))
     if not any(state.alive for state in stations.values()):
         named = "" if station == "*" else f"{station} "
         why = "; ".join(troubles) or "is the service running?"

@@ -20,8 +20,10 @@ STATION_FORMAT = 1
 # nominal colours that are no farther apart than that pass for each other.
 COLOR_REACH = 0.24
 
-# No link of an exoskeleton for a limb is longer: farther from its link no elbow and no camera can be.
+# No link of an exoskeleton for a limb is longer: farther from its link no elbow can be.
 _LONGEST_LINK_M = 1.0
+# A camera of the base link may stand on a tripod or hang from the ceiling.
+_FARTHEST_CAMERA_M = 5.0
 # Farther from its joint no marker is worn: the longest upper arms and shanks are under 0.5 m.
 _LONGEST_LIMB_M = 0.5
 
@@ -52,7 +54,7 @@ def _within(limit_m: float) -> Callable[[tuple[Row, Row, Row, Row]], tuple[Row, 
 
 
 RigidMatrix = Annotated[tuple[Row, Row, Row, Row], AfterValidator(_rigid)]
-LinkMatrix = Annotated[RigidMatrix, AfterValidator(_within(_LONGEST_LINK_M))]
+CameraMatrix = Annotated[RigidMatrix, AfterValidator(_within(_FARTHEST_CAMERA_M))]
 LimbMatrix = Annotated[RigidMatrix, AfterValidator(_within(_LONGEST_LIMB_M))]
 
 
@@ -180,7 +182,7 @@ class Calibration(Strict):
     """Rigid transforms found by calibration, (4, 4) row by row, metres."""
 
     id: Name
-    link_from_camera: dict[str, LinkMatrix] = Field(description="Camera (OpenCV axes) in its link's frame, eq. (6)")
+    link_from_camera: dict[str, CameraMatrix] = Field(description="Camera (OpenCV axes) in its link's frame, eq. (6)")
     m0_from_gh: LimbMatrix = Field(description="GH joint frame in the m0 frame, eq. (8)")
     m1_from_elw: LimbMatrix = Field(description="Elbow frame in the m1 frame, eq. (9)")
     arm_length_m: float | None = Field(

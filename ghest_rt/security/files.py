@@ -4,7 +4,7 @@ import os
 import stat
 from pathlib import Path
 
-from ghest_rt.errors import BadInputError
+from ghest_rt.errors import BadInputError, NotPermittedError
 
 _MAX_BYTES = 1_000_000
 SECRET_MODE = 0o600
@@ -15,13 +15,13 @@ def read_small(path: Path, what: str) -> bytes:
     """Return a file's bytes.
 
     Raises:
-        BadInputError: It cannot be read, or is larger than anything of its kind.
+        BadInputError: It cannot be read (NotPermittedError: by this user), or is larger than anything of its kind.
     """
     try:
         with path.open("rb") as file:
             data = file.read(_MAX_BYTES + 1)
     except OSError as error:
-        raise BadInputError(f"{path}: cannot read the {what}: {error.strerror or error}") from error
+        raise _unreadable(error)(f"{path}: cannot read the {what}: {error.strerror or error}") from error
     if len(data) > _MAX_BYTES:
         raise BadInputError(f"{path}: the {what} is larger than {_MAX_BYTES} bytes; is it the right file?")
     return data
@@ -73,10 +73,14 @@ def check_secret(path: Path) -> None:
     try:
         facts = path.stat()
     except OSError as error:
-        raise BadInputError(f"{path}: cannot read the private key: {error.strerror or error}") from error
+        raise _unreadable(error)(f"{path}: cannot read the private key: {error.strerror or error}") from error
     mode = stat.S_IMODE(facts.st_mode)
     lent = stat.S_IRGRP if facts.st_uid == 0 else 0
     if mode & 0o077 & ~lent:
         raise BadInputError(
             f"{path}: others on this machine can read or change this private key (mode {mode:04o}): chmod 600 {path}"
         )
+
+
+def _unreadable(error: OSError) -> type[BadInputError]:
+    return NotPermittedError if isinstance(error, PermissionError) else BadInputError

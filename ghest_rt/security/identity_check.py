@@ -11,7 +11,7 @@ from cryptography.exceptions import InvalidSignature, UnsupportedAlgorithm
 from cryptography.hazmat.primitives.serialization import load_pem_private_key
 from cryptography.x509.oid import ExtendedKeyUsageOID
 
-from ghest_rt.errors import BadInputError
+from ghest_rt.errors import BadInputError, NotPermittedError
 from ghest_rt.security.access import ACCESS_FILE, load_access
 from ghest_rt.security.certificates import hosts_of, name_of
 from ghest_rt.security.files import check_secret, read_small
@@ -29,9 +29,14 @@ def load_identity(folder: Path, now: datetime | None = None) -> Identity:
     Raises:
         BadInputError: A file is missing or malformed; the certificate is not yet or no longer valid, or another authority's;
             the key is another's or readable by others; a station has no access list. Names the file and the remedy.
+        NotPermittedError: This user may not read it.
     """
     now = datetime.now(UTC) if now is None else now
-    if not (folder / CERTIFICATE_FILE).exists():
+    try:
+        there = (folder / CERTIFICATE_FILE).exists()
+    except PermissionError as error:
+        raise NotPermittedError(f"{folder}: cannot look for an identity here: {error.strerror}") from error
+    if not there:
         raise BadInputError(f"{folder}: no identity here; name a folder that ghest-rt certs issue made")
     authority = load_certificate(folder / CA_FILE)
     path = folder / CERTIFICATE_FILE

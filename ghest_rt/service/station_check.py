@@ -40,6 +40,7 @@ def check_station(
 
     Raises:
         BadInputError: Two parts of the station do not fit each other, or a file it names cannot be used.
+        NotPermittedError: This user may not look at the identity.
         DeviceError: A file that stands for a device is missing.
         GhestError: The extra `security` is needed and not installed.
     """
@@ -128,7 +129,7 @@ def _check_publisher(station: LoadedStation, listen: str | None) -> None:
         identity = None if publisher.identity is None else _identity(Path(station.source).parent / publisher.identity)
         session_settings(publisher.listen if listen is None else (listen,), publisher.connect, identity)
     except BadInputError as error:
-        raise BadInputError(f"{station.source}: publisher: {error}") from error
+        raise type(error)(f"{station.source}: publisher: {error}") from error
 
 
 def _identity(folder: Path) -> "Identity":

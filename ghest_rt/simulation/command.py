@@ -1,5 +1,6 @@
 """`ghest-rt simulate`: record a simulated session, sensors and truth, to a file."""
 
+import os
 import shlex
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
@@ -68,16 +69,17 @@ def simulate(options: SimulateOptions, progress: Callable[[float], None]) -> Sim
     for camera, given in deliveries.items():
         if not given:
             raise BadInputError(f"camera {camera} would deliver no frame at all: drop fewer (--fault), or simulate longer")
-    part = options.out.with_name(options.out.name + ".part")
+    part = options.out.with_name(f"{options.out.name}.{os.getpid()}.part")
     try:
         with RecordingWriter(part, world.station, facts) as writer:
             rows = _write(writer, world, devices, deliveries, progress)
         part.replace(options.out)
-    except GhestError as error:
-        if not isinstance(error.__cause__, OSError):
+    except (GhestError, OSError) as error:
+        cause = error if isinstance(error, OSError) else error.__cause__
+        if not isinstance(cause, OSError):
             raise
-        cause = error.__cause__.strerror or error.__cause__
-        raise type(error)(f"{options.out}: cannot write the recording: {cause}; nothing is left of it") from error
+        kind = type(error) if isinstance(error, GhestError) else GhestError
+        raise kind(f"{options.out}: cannot write the recording: {cause.strerror or cause}; nothing is left of it") from error
     finally:
         part.unlink(missing_ok=True)
     progress(1.0)

@@ -8,12 +8,13 @@ from types import SimpleNamespace
 import pytest
 
 from ghest_drivers.hardware.probe import ProbeResult
-from ghest_rt.cli.doctor import command
+from ghest_rt.cli.doctor import command, station_file
 from ghest_rt.cli.doctor.checklist import CHECKLIST
 from ghest_rt.cli.doctor.findings import Finding, State, exit_code, missing, note, ok
 from ghest_rt.cli.doctor.links import SerialPort
 from ghest_rt.cli.doctor.station_file import look_at_station
 from ghest_rt.config.shipped import shipped_config_dir
+from ghest_rt.errors import NotPermittedError
 from tests.doctor.stations import SR300, station_of
 from tests.program import COMMAND
 
@@ -65,6 +66,18 @@ def test_a_station_that_the_service_would_refuse_is_not_ready(tmp_path: Path, st
     finding = next(one for one in json.loads(done.stdout)["findings"] if one["check"] == "station file's parts")
     assert finding["exit_code"] == 2
     assert str(tmp_path / "station.toml") in finding["detail"]
+
+
+def test_what_this_user_may_not_look_at_is_noted(tmp_path: Path, station_text: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(_: object) -> None:
+        raise NotPermittedError("/etc/ghest-rt/identity: cannot look for an identity here: Permission denied")
+
+    monkeypatch.setattr(station_file, "check_station", refuse)
+    station_of(tmp_path, station_text)
+    _, findings = station_file.look_at_station(tmp_path / "station.toml")
+    found = next(one for one in findings if one.check == "station file's parts")
+    assert (found.state, found.exit_code) == (State.NOTE, 0)
+    assert "service's user" in found.remedy
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,6 @@
 """The command that installs an extra: from where the installed distribution came."""
 
+import shlex
 from pathlib import Path
 from typing import Any
 
@@ -21,18 +22,23 @@ from ghest_drivers.installing import pip_install, requirement
             {"url": "https://b.org/g.git", "vcs_info": {"vcs": "git", "commit_id": "ab12"}},
             "'ghest-rt[can] @ git+https://b.org/g.git@ab12'",
         ),
+        (
+            {"url": "https://b.org/g.git", "vcs_info": {"vcs": "git", "commit_id": "ab12"}, "subdirectory": "rt"},
+            "'ghest-rt[can] @ git+https://b.org/g.git@ab12#subdirectory=rt'",
+        ),
     ],
 )
 def test_what_pip_is_given(origin: dict[str, Any] | None, expected: str) -> None:
     assert requirement(origin, "can") == expected
 
 
-def test_a_folder_that_is_still_there_is_named(tmp_path: Path) -> None:
-    folder = tmp_path / "with space"
+@pytest.mark.parametrize("name", ["with space", "O'Brien"])
+def test_a_folder_that_is_still_there_is_named(tmp_path: Path, name: str) -> None:
+    folder = tmp_path / name
     folder.mkdir()
     (folder / "pyproject.toml").touch()
-    assert requirement({"url": folder.as_uri(), "dir_info": {}}, "can") == f"'{folder}[can]'"
-    assert requirement({"url": folder.as_uri(), "dir_info": {"editable": True}}, "") == f"-e '{folder}'"
+    assert shlex.split(requirement({"url": folder.as_uri(), "dir_info": {}}, "can")) == [f"{folder}[can]"]
+    assert shlex.split(requirement({"url": folder.as_uri(), "dir_info": {"editable": True}}, "")) == ["-e", str(folder)]
 
 
 def test_the_installed_one_has_such_a_command() -> None:

@@ -178,6 +178,21 @@ def test_the_command_keeps_what_comes_before_a_change_and_ends_with_an_error(tmp
     assert 600_000 < kept < (tmp_path / "open" / "other.mcap").stat().st_size
 
 
+def test_the_command_tells_of_every_file_whatever_becomes_of_the_others(tmp_path: Path, key: Key) -> None:
+    first, second, third = (record(tmp_path / name, (key.public,))[0].rename(tmp_path / f"{name}.mcap.age") for name in "abc")
+    first.write_bytes(first.read_bytes()[:700_000])
+    out = tmp_path / "open"
+    out.mkdir()
+    (out / "b.mcap").touch()
+    files = [str(path) for path in (first, second, third)]
+    command = [*COMMAND, "decrypt", *files, "--key", str(key.path), "--out", str(out)]
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    assert ended.returncode == 2
+    assert f"{first}: cut off or changed" in ended.stderr
+    assert f"{out / 'b.mcap'} exists already" in ended.stderr
+    assert messages(out / "c.mcap") == messages(open_sealed(third, key, tmp_path / "whole.mcap"))
+
+
 @pytest.mark.parametrize("pseudonym", ["P-0042", "P0042", "AB-17", "XYZ-99999"])
 def test_pseudonyms(pseudonym: str) -> None:
     assert check_subject(pseudonym) == pseudonym

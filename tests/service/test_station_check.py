@@ -1,17 +1,20 @@
 """A station whose parts do not fit each other is refused before anything is started, whoever asks."""
 
+import os
 import shutil
 from pathlib import Path
 
 import pytest
 
+from ghest_rt.cli.install_service.station_files import accept
 from ghest_rt.config.load import load_station
 from ghest_rt.config.shipped import shipped_config_dir
-from ghest_rt.errors import BadInputError, DeviceError, GhestError
+from ghest_rt.errors import BadInputError, DeviceError, GhestError, NotPermittedError
 from ghest_rt.security.authority import Authority
 from ghest_rt.security.roles import Role
 from ghest_rt.service.station_check import check_station
 
+_NOBODY = 65534
 SIM = (shipped_config_dir() / "station-sim.toml").read_text()
 SERIAL = (shipped_config_dir() / "station-sr300-serial.toml").read_text()
 REAL = 'device = { backend = "serial", port = "/dev/ttyUSB0", baud = 115200 }'
@@ -109,6 +112,27 @@ def test_every_shipped_station_passes(tmp_path: Path) -> None:
     assert len(paths) > 5
     for path in paths:
         check_station(load_station(path))
+
+
+def test_an_identity_that_this_user_may_not_look_at_is_no_mistake_of_the_station(tmp_path: Path) -> None:
+    identity = Authority.create(tmp_path / "pki", "Clinic A", 30).issue(Role.STATION, "bed-1", ["127.0.0.1"], 10)
+    told = f'[publisher]\nlisten = ["tls/0.0.0.0:7446"]\nidentity = "{identity}"\n[elbow]'
+    path = tmp_path / "station.toml"
+    path.write_text(SIM.replace("[elbow]", told), encoding="utf-8")
+    shutil.copy(shipped_config_dir() / "armeo_spring.urdf", tmp_path)
+    station = load_station(path)
+    check_station(station)
+    identity.chmod(0)
+    user = os.geteuid()
+    if user == 0:
+        os.seteuid(_NOBODY)
+    try:
+        with pytest.raises(NotPermittedError, match=f"{identity}: cannot look for an identity here"):
+            check_station(station)
+        accept(station, here=True)
+    finally:
+        os.seteuid(user)
+    identity.chmod(0o700)
 
 
 def test_elsewhere_the_identity_and_the_files_of_this_machine_are_not_looked_at(folder: Path) -> None:

@@ -1,5 +1,6 @@
 """What the simulation refuses: options without effect or beyond their range, and stations that it cannot set up."""
 
+import os
 from dataclasses import replace
 from pathlib import Path
 
@@ -98,7 +99,7 @@ def test_what_an_interruption_or_a_full_disk_leaves_is_removed_and_an_older_reco
     with pytest.raises(KeyboardInterrupt):
         simulate(options, interrupt)
     assert [path.name for path in tmp_path.iterdir()] == ["a.mcap"]
-    (tmp_path / "a.mcap.part").symlink_to("/dev/full")
+    (tmp_path / f"a.mcap.{os.getpid()}.part").symlink_to("/dev/full")
     with pytest.raises(GhestError, match=r"a.mcap: cannot write the recording: No space left on device; nothing is left"):
         simulate(options, lambda _: None)
     assert [path.name for path in tmp_path.iterdir()] == ["a.mcap"]

@@ -11,7 +11,7 @@ from rich.text import Text
 
 from ghest_drivers.clock import MonotonicClock
 from ghest_drivers.hardware.probe import probe
-from ghest_rt.cli.console import print_json
+from ghest_rt.cli.console import print_json, printing
 from ghest_rt.cli.doctor.checklist import Item, items_for
 from ghest_rt.cli.doctor.devices import Present, check_present, check_station_devices, check_without_station
 from ghest_rt.cli.doctor.findings import Finding, State, exit_code, missing
@@ -53,7 +53,8 @@ def run_doctor(station_path: Path | None, live_s: float | None, as_json: bool) -
             }
         )
     else:
-        _print(Console(), findings, items, code)
+        with printing():
+            _print(Console(), findings, items, code)
     return code
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from ghest_rt.cli.doctor.findings import Finding, missing, note, ok
 from ghest_rt.config.load import LoadedStation, load_station
-from ghest_rt.errors import BadInputError, GhestError
+from ghest_rt.errors import BadInputError, GhestError, NotPermittedError
 from ghest_rt.service.station_check import check_station
 
 # In the name of the file or of the robot, and in what is written in the file: "armeo_spring_left", "Armeo Spring, right arm".
@@ -31,6 +31,8 @@ def _of(station: LoadedStation) -> Iterator[Finding]:
     yield ok("station file", f"{station.source}: station {config.station.id}, {config.station.arm} arm")
     try:
         check_station(station)
+    except NotPermittedError as error:
+        yield note("station file's parts", str(error), "look again as the service's user, or as root")
     except GhestError as error:
         remedy = "correct it; the service would end with this message"
         yield missing("station file's parts", str(error), remedy, error.exit_code)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from ghest_rt.errors import BadInputError
 
-_CPUS = re.compile(r"^[0-9]{1,5}(-[0-9]{1,5})?(,[0-9]{1,5}(-[0-9]{1,5})?)*$")
+_CPUS = re.compile(r"[0-9]{1,5}(-[0-9]{1,5})?(,[0-9]{1,5}(-[0-9]{1,5})?)*")
 _CPUS_PRESENT = Path("/sys/devices/system/cpu/present")
 
 
@@ -19,10 +19,10 @@ def check_cpus(cpus: str, must_exist: bool) -> None:
     Raises:
         BadInputError: It cannot be used.
     """
-    if not _CPUS.match(cpus) or any(first > last for first, last in _ranges(cpus)):
+    if not _CPUS.fullmatch(cpus) or any(first > last for first, last in _ranges(cpus)):
         raise BadInputError(f"--cpus {cpus!r}: write CPUs as 2-3 or 2,3")
     present = _CPUS_PRESENT.read_text(encoding="ascii").strip() if _CPUS_PRESENT.is_file() else ""
-    if not must_exist or not _CPUS.match(present):
+    if not must_exist or not _CPUS.fullmatch(present):
         return
     exist = {number for first, last in _ranges(present) for number in range(first, last + 1)}
     if any(not exist.issuperset((first, last)) for first, last in _ranges(cpus)):

@@ -8,14 +8,13 @@ from ghest_drivers.installing import pip_install
 from ghest_rt.cli.install_service.cpus import check_cpus
 from ghest_rt.cli.install_service.gateway import GATEWAY_UNIT, IDENTITY_DIR, KEY_PATH, gateway_unit, identity_files
 from ghest_rt.cli.install_service.record import RECORD, Installed, InstalledService, read_record, sha256
-from ghest_rt.cli.install_service.station_files import STATION_FILE, clash, leaves_machine, station_files
+from ghest_rt.cli.install_service.station_files import STATION_FILE, accept, clash, leaves_machine, station_files
 from ghest_rt.cli.install_service.steps import RemoveFile, RunCommand, Step, WriteFile
 from ghest_rt.config.load import load_station
 from ghest_rt.errors import BadInputError
-from ghest_rt.service.station_check import check_station
 
 _SYSTEM = "etc/systemd/system"
-_NAME = re.compile(r"^[A-Za-z0-9_-]{1,64}$")
+_NAME = re.compile(r"[A-Za-z0-9_-]{1,64}")
 _EXECUTABLE = re.compile(r"^/[A-Za-z0-9._/+-]+$")
 _SHIPPED_EXECUTABLE = "/opt/ghest-rt/bin/ghest-rt"
 _HIDDEN = tuple(map(PurePosixPath, ("/home", "/root", "/run/user", "/tmp", "/var/tmp")))  # noqa: S108  (not used, refused)
@@ -40,7 +39,7 @@ class Target:
     name: str | None
 
     def __post_init__(self) -> None:
-        if self.name is not None and not _NAME.match(self.name):
+        if self.name is not None and not _NAME.fullmatch(self.name):
             raise BadInputError(f"--name {self.name!r}: 1 to 64 letters, digits, - and _")
 
     @property
@@ -123,7 +122,7 @@ def plan_install(
         kept: dict[str, str] = {}
     elif before is not None and (target.root / station_path).exists():
         kept_station = load_station(target.root / station_path)
-        check_station(kept_station, here=target.live)
+        accept(kept_station, here=target.live)
         config = kept_station.config
         kept = {path: digest for path, digest in before.files.items() if path.startswith(f"{target.config_dir}/")}
     else:

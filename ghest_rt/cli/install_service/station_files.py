@@ -1,11 +1,12 @@
 """The files of a station that the service needs beside its station file."""
 
+import contextlib
 from collections.abc import Sequence
 from pathlib import Path, PurePosixPath
 
-from ghest_rt.config.load import load_station
+from ghest_rt.config.load import LoadedStation, load_station
 from ghest_rt.config.station import StationConfig
-from ghest_rt.errors import BadInputError
+from ghest_rt.errors import BadInputError, NotPermittedError
 from ghest_rt.service.station_check import check_station
 
 STATION_FILE = "station.toml"
@@ -20,7 +21,7 @@ def station_files(path: Path, *, here: bool) -> tuple[StationConfig, dict[str, b
 
     Raises:
         BadInputError: The station file is invalid, is one of a replay, or names files that cannot be taken along.
-        GhestError: The service would refuse it (`check_station`).
+        GhestError: The service would refuse it.
     """
     station = load_station(path)
     config = station.config
@@ -47,8 +48,24 @@ def station_files(path: Path, *, here: bool) -> tuple[StationConfig, dict[str, b
             files[str(relative)] = (path.parent / relative).read_bytes()
         except OSError as error:
             raise BadInputError(f"{path}: {key}: cannot read {path.parent / relative}: {error.strerror or error}") from error
-    check_station(station, here=here)
+    accept(station, here=here)
     return config, files
+
+
+def accept(station: LoadedStation, *, here: bool) -> None:
+    """Refuse a station that the service would refuse.
+
+    What this user may not look at is left to the installation itself, which root does, and to the service's user.
+
+    Args:
+        station: The station.
+        here: Whether it will run on this machine.
+
+    Raises:
+        GhestError: The service would refuse it (`check_station`).
+    """
+    with contextlib.suppress(NotPermittedError):
+        check_station(station, here=here)
 
 
 def clash(config: StationConfig, others: Sequence[tuple[str, Path]]) -> None:
