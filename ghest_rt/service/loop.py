@@ -114,6 +114,7 @@ class Service:
         finally:
             self._pacer.stop()
             self._alarm.close()
+            self._alarm = None
             await self._stop_inputs(encoder_task)
         self._send_health(self._clock.now_ns())
         self._events.tell(EventKind.STOPPED, "info", "service", f"{self._counts.published} samples published")

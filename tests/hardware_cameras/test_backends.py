@@ -140,5 +140,5 @@ def test_a_missing_library_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> N
     for module in [name for name in sys.modules if name.startswith("ghest_drivers.hardware.realsense")]:
         monkeypatch.delitem(sys.modules, module)
     monkeypatch.setitem(sys.modules, "pyrealsense2", None)
-    with pytest.raises(DeviceNotFound, match=r"ghest-rt\[realsense\]"):
+    with pytest.raises(DeviceNotFound, match=r"pip install .*\[realsense\]"):
         camera_backends.realsense(name="r0", clock=MonotonicClock(), serial="1", supervised=False)

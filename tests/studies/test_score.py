@@ -5,6 +5,7 @@ import re
 from pathlib import Path
 
 import cv2
+import matplotlib as mpl
 import pytest
 from typer.testing import CliRunner
 
@@ -84,7 +85,10 @@ def test_the_picture_is_drawn_and_a_wrong_ending_refused(tmp_path: Path) -> None
         draw_recording(FIXTURES / "SFE.mcap", tmp_path / "none" / "sfe.svg")
 
 
-def test_the_picture_names_what_it_shows_in_order_and_says_what_was_lost(tmp_path: Path) -> None:
+def test_the_picture_names_what_it_shows_in_order_and_says_what_was_lost(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(mpl.rcParams, "svg.fonttype", "path")  # whatever other figures have set
     out = tmp_path / "a.mcap"
     blind = parse_fault("blind:r1:0.2:0.5")
     simulate(SimulateOptions(out=out, movement="SFE", duration_s=0.8, faults=(blind,), seed=7), lambda _: None)
