@@ -241,3 +241,18 @@ async def test_nothing_is_left_running() -> None:
 def test_pauses_double_up_to_their_limit() -> None:
     delays_s = Backoff().delays_s()
     assert [next(delays_s) for _ in range(7)] == [0.25, 0.5, 1.0, 2.0, 4.0, 5.0, 5.0]
+
+
+async def test_a_first_frame_that_comes_while_the_service_stops_starts_nothing() -> None:
+    rig = Rig()
+
+    async def scene() -> None:
+        rig.feed(cameras=("r0",))
+        await rig.out.until(lambda: bool(rig.pipelines) and "r0" in rig.pipelines[0].newest_ns)
+
+    await rig.during(scene)
+    published = len(rig.out.samples)
+    late = rig.pipelines[0].observe(frame("r1", 0, rig.clock.now_ns()))
+    rig.service.observed(late)
+    await asyncio.sleep(0.05)
+    assert len(rig.out.samples) == published
