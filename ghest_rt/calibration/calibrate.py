@@ -7,8 +7,9 @@ from pathlib import Path
 
 from ghest_rt.calibration.centre import UnknowableCentreError
 from ghest_rt.calibration.hold import Hold, find_hold
+from ghest_rt.calibration.options import CalibrationOptions
 from ghest_rt.calibration.session import Session
-from ghest_rt.calibration.solve import ElbowFrom, Found, solve
+from ghest_rt.calibration.solve import Found, solve
 from ghest_rt.calibration.station_text import rigid_rows, with_calibration
 from ghest_rt.calibration.verdict import Objection, Refusal, object_to_hold, object_to_movement, object_to_view
 from ghest_rt.config.load import LoadedStation, parse_station
@@ -18,21 +19,6 @@ from ghest_rt.errors import BadInputError
 _GH = "gh"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class CalibrationOptions:
-    """What the session alone does not say.
-
-    Attributes:
-        calibration_id: Name of the new calibration.
-        elbow_from: What gives the arm's axis.
-        arm_length_m: From elbow to GH centre as measured on the patient; None if it was not.
-    """
-
-    calibration_id: str
-    elbow_from: ElbowFrom = "posture"
-    arm_length_m: float | None = None
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Outcome:
     """What became of a session.
@@ -40,7 +26,7 @@ class Outcome:
     Attributes:
         objections: Why it is not used; () if it is.
         found: What it tells; None where not even that could be made out.
-        calibration: The new calibration; None without `found`.
+        calibration: The new calibration; None where there are objections: its numbers may be no calibration's at all.
     """
 
     objections: tuple[Objection, ...]
@@ -52,10 +38,8 @@ def calibrate(session: Session, station: LoadedStation, options: CalibrationOpti
     """Return the calibration that a session gives, and whether it is to be used.
 
     Raises:
-        BadInputError: An option cannot be used, or does not fit the session.
+        BadInputError: An option does not fit the session.
     """
-    if not re.fullmatch(r"[A-Za-z0-9_-]{1,64}", options.calibration_id):
-        raise BadInputError(f"--id {options.calibration_id}: give up to 64 letters, digits, - and _")
     objections = object_to_view(session)
     hold = find_hold(session)
     objections += object_to_hold(hold)
@@ -68,8 +52,9 @@ def calibrate(session: Session, station: LoadedStation, options: CalibrationOpti
         text = f"{error}: move the shoulder through flexion, abduction and rotation after the neutral posture"
         objections.append(Objection(Refusal.RANGE_TOO_SMALL, text))
         return Outcome(tuple(objections), None, None)
-    objections += object_to_movement(found)
-    return Outcome(tuple(objections), found, _calibration(found, old, options.calibration_id))
+    objections += object_to_movement(found, posture_unchecked=options.posture_unchecked)
+    calibration = None if objections else _calibration(found, old, options.calibration_id)
+    return Outcome(tuple(objections), found, calibration)
 
 
 def check_joint(station: LoadedStation) -> None:
@@ -89,8 +74,9 @@ def new_station_text(station: LoadedStation, calibration: Calibration, hold: Hol
     Raises:
         BadInputError: The file is not written in a way that can be changed.
     """
+    name = "".join(letter if letter.isprintable() else "?" for letter in recording)
     remark = (
-        f"from {recording}, neutral posture held from {hold.start_s:.1f} to {hold.end_s:.1f} s (docs/calibration.md). "
+        f"from {name}, neutral posture held from {hold.start_s:.1f} to {hold.end_s:.1f} s (docs/calibration.md). "
         "Numbers in comments below are those of the mounting."
     )
     text = with_calibration(station.toml_text, station.source, calibration, remark)

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ghest_rt.calibration.session import Session
-from ghest_rt.geometry.so3 import Array, nearest_rotation
+from ghest_rt.geometry.so3 import Array, angle_between_rad, nearest_rotation
 
 LEAST_S = 2.0
 """So long a posture must be held."""
@@ -16,9 +16,11 @@ BEGINS_WITHIN_S = 15.0
 STILL_RAD = math.radians(0.8)
 """Of each marker, root mean square."""
 STILL_M = 0.005
+LEAST_SEEN = 0.6
+"""Share of the posture's instants at which both markers must be known."""
 
+_LEAST_SPAN = 0.9  # from the first instant known to the last, as a share of the posture
 _STEP_S = 0.25
-_LEAST_INSTANTS = 30
 _ENDING_S = 0.5  # a movement begins slowly: the last of a hold is left out where enough remains
 
 
@@ -49,45 +51,48 @@ def find_hold(session: Session) -> Hold | None:
     """Return the first still stretch of at least `LEAST_S`, as long as it lasts; None if there is none."""
     if not len(session.t_s):
         return None
-    start_s = float(session.t_s[0])
+    start_s, step_s = float(session.t_s[0]), _step_s(session)
     while start_s <= BEGINS_WITHIN_S:
         hold = _held(session, start_s, start_s + LEAST_S)
         if hold is not None:
             whole = _as_long_as_it_lasts(session, hold)
             return _held(session, whole.start_s, max(whole.end_s - _ENDING_S, hold.end_s)) or whole
-        start_s += _STEP_S
+        start_s += step_s
     return None
 
 
 def _as_long_as_it_lasts(session: Session, hold: Hold) -> Hold:
+    step_s = _step_s(session)
     while True:
-        newest = _held(session, hold.end_s, hold.end_s + _STEP_S, least=5)
-        longer = _held(session, hold.start_s, hold.end_s + _STEP_S)
+        newest = _held(session, hold.end_s, hold.end_s + step_s, least_span=0.0)
+        longer = _held(session, hold.start_s, hold.end_s + step_s)
         if newest is None or longer is None:
             return hold
         for mean, now in ((hold.e_from_m0, newest.e_from_m0), (hold.e_from_m1, newest.e_from_m1)):
-            if _angle_rad(mean, now[None])[0] > STILL_RAD:
+            if angle_between_rad(mean, now) > STILL_RAD:
                 return hold
         hold = longer
 
 
-def _held(session: Session, start_s: float, end_s: float, least: int = _LEAST_INSTANTS) -> Hold | None:
-    """Return a stretch if it is still."""
+def _step_s(session: Session) -> float:
+    """Return how far the ends of the stretches that are tried lie apart: one instant at least."""
+    return max(_STEP_S, session.period_s)
+
+
+def _held(session: Session, start_s: float, end_s: float, least_span: float = _LEAST_SPAN) -> Hold | None:
+    """Return a stretch if it is still, and seen for most of its time."""
     within = (session.t_s >= start_s) & (session.t_s < end_s)
-    if np.count_nonzero(within) < least:
+    t_s, length_s = session.t_s[within], end_s - start_s
+    if not len(t_s) or len(t_s) * session.period_s < LEAST_SEEN * length_s:
+        return None
+    if float(t_s[-1] - t_s[0]) + session.period_s < least_span * length_s:
         return None
     means, strays = [], []
     for poses in (session.e_from_m0[within], session.e_from_m1[within]):
         mean = nearest_rotation(poses[:, :3, :3].mean(axis=0))
-        stray_rad = float(np.sqrt(np.mean(_angle_rad(mean, poses[:, :3, :3]) ** 2)))
+        stray_rad = math.sqrt(np.mean([angle_between_rad(mean, R) ** 2 for R in poses[:, :3, :3]]))
         if stray_rad > STILL_RAD or float(np.sqrt(poses[:, :3, 3].var(axis=0).sum())) > STILL_M:
             return None
         means.append(mean)
         strays.append(stray_rad)
     return Hold(within, start_s, end_s, means[0], means[1], strays[0], strays[1])
-
-
-def _angle_rad(mean: Array, rotations: Array) -> Array:
-    """Return the (n,) angles between a rotation and others, exact for small ones, too."""
-    apart = np.linalg.norm(rotations - mean, axis=(1, 2))  # = sqrt(8) sin(angle / 2)
-    return np.asarray(2.0 * np.arcsin(np.clip(apart / math.sqrt(8.0), 0.0, 1.0)))

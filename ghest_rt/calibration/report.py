@@ -29,25 +29,25 @@ class Row:
     sigma: str
 
 
-def rows_of(old: Calibration, new: Calibration, found: Found) -> list[Row]:
-    """Return the rows of the table."""
+def rows_of(old: Calibration, found: Found) -> list[Row]:
+    """Return the rows of the table; what was found need not be a calibration that a station file takes."""
     sigma = np.sqrt(np.diag(found.gh.covariance))
     hold = found.hold
     attitude = "{:.2f}° held"
-    m1 = np.array(new.m1_from_elw)
+    m1 = found.m1_from_elw
     elbow_sigma_m = np.sqrt(np.square(sigma[3:]) + np.square(found.length.sigma_m * m1[:3, 1]))
     rows = [
-        _place("GH centre in m0, mm", np.array(old.m0_from_gh)[:3, 3], np.array(new.m0_from_gh)[:3, 3], sigma[:3]),
-        _place("GH centre in m1, mm", _gh_in_m1(old), _gh_in_m1(new), sigma[3:]),
-        _attitude("GH frame, turned in m0", old.m0_from_gh, new.m0_from_gh, attitude.format(math.degrees(hold.m0_rad))),
-        _attitude("elbow frame, turned in m1", old.m1_from_elw, new.m1_from_elw, attitude.format(math.degrees(hold.m1_rad))),
+        _place("GH centre in m0, mm", np.array(old.m0_from_gh)[:3, 3], found.gh.first_m, sigma[:3]),
+        _place("GH centre in m1, mm", _gh_in_m1(old), found.gh.second_m, sigma[3:]),
+        _attitude("GH frame, turned in m0", old.m0_from_gh, found.m0_from_gh, attitude.format(math.degrees(hold.m0_rad))),
+        _attitude("elbow frame, turned in m1", old.m1_from_elw, m1, attitude.format(math.degrees(hold.m1_rad))),
         _place("elbow in m1, mm", np.array(old.m1_from_elw)[:3, 3], m1[:3, 3], elbow_sigma_m),
-        _length(old, new, found),
-        _elbow_in_link(old, new, found),
+        _length(old, found),
+        _elbow_in_link(old, found),
     ]
-    if new.reference.forearm_twist_deg is not None and found.forearm_twist_sigma_rad is not None:
+    if found.forearm_twist_rad is not None and found.forearm_twist_sigma_rad is not None:
         before = old.reference.forearm_twist_deg
-        after = new.reference.forearm_twist_deg
+        after = math.degrees(found.forearm_twist_rad)
         change = "" if before is None else f"{after - before:+.2f}°"
         strayed = f"{math.degrees(found.forearm_twist_sigma_rad):.2f}° held"
         rows.append(Row("forearm twist", "" if before is None else f"{before:.2f}°", f"{after:.2f}°", change, strayed))
@@ -63,14 +63,19 @@ def notes_of(found: Found) -> list[str]:
     ]
     if found.pivot is None or found.pivot_off_rad is None:
         notes.append(
-            "the exoskeleton's elbow could not be made out (the elbow has hardly moved, or about one axis alone): whether the "
-            "arm was in the neutral posture is judged by the forearm alone"
+            "NOT CHECKED: whether the arm pointed forward and level in the neutral posture (the elbow has hardly moved, or "
+            "about one axis alone, so that the exoskeleton's elbow is unknown); by what it was off, every later angle is off"
         )
     else:
         apart = np.linalg.norm(found.pivot.second_m - found.m1_from_elw[:3, 3])
         notes.append(
             f"the exoskeleton's elbow is {1000 * apart:.0f} mm from the elbow found, {math.degrees(found.pivot_off_rad):.1f}° "
             "from the arm's axis as seen from the GH centre"
+        )
+    if found.forearm_twist_rad is None:
+        notes.append(
+            "NOT CHECKED: how the arm was turned about its own axis in the neutral posture, and whether the elbow was "
+            "bent: the exoskeleton does not know the forearm"
         )
     return notes
 
@@ -102,8 +107,8 @@ def _tilt(R: Array) -> str:
     return f"{math.degrees(angle_between_rad(R, np.eye(3))):.2f}°"
 
 
-def _length(old: Calibration, new: Calibration, found: Found) -> Row:
-    before, after = old.arm_length_m, new.arm_length_m or 0.0
+def _length(old: Calibration, found: Found) -> Row:
+    before, after = old.arm_length_m, found.length.metres
     return Row(
         "elbow to GH centre, mm",
         "" if before is None else f"{1000 * before:.1f}",
@@ -113,11 +118,11 @@ def _length(old: Calibration, new: Calibration, found: Found) -> Row:
     )
 
 
-def _elbow_in_link(old: Calibration, new: Calibration, found: Found) -> Row:
-    before, after = old.reference.elbow_in_link_m, new.reference.elbow_in_link_m
+def _elbow_in_link(old: Calibration, found: Found) -> Row:
+    before = old.reference.elbow_in_link_m
     return _place(
         "elbow in link of r1, mm",
         None if before is None else np.array(before),
-        None if after is None else np.array(after),
+        found.elbow_in_link_m,
         found.elbow_in_link_sigma_m,
     )

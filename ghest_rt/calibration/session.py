@@ -36,6 +36,7 @@ class Session:
         forearm_in_e: (n, 3) direction of the forearm, elbow to wrist; None where it is not on the exoskeleton.
         instants: How many instants the grid has.
         missing: How many of them do not count, by reason.
+        period_s: From one instant of the grid to the next.
     """
 
     t_s: Array
@@ -45,6 +46,12 @@ class Session:
     forearm_in_e: Array | None
     instants: int
     missing: dict[str, int]
+    period_s: float
+
+    @property
+    def seen_s(self) -> float:
+        """For how long both markers and the joints are known."""
+        return len(self.t_s) * self.period_s
 
     @property
     def seen_fraction(self) -> float:
@@ -108,6 +115,7 @@ def session_of(
         forearm_in_e=np.array(forearms) if forearms else None,
         instants=len(estimates),
         missing=dict(missing),
+        period_s=1.0 / station.config.rate_hz,
     )
 
 

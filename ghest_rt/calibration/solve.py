@@ -2,17 +2,18 @@
 
 import math
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ghest_rt.calibration.arm_axis import ArmAxis
 from ghest_rt.calibration.centre import SharedCentre, UnknowableCentreError, find_centre
 from ghest_rt.calibration.hold import Hold
 from ghest_rt.calibration.session import Session
 from ghest_rt.config.station import Calibration
 from ghest_rt.errors import BadInputError
 from ghest_rt.estimation.angles import euler_yxz
+from ghest_rt.estimation.arm import ELW_FROM_ARM
 from ghest_rt.geometry.se3 import transform
 from ghest_rt.geometry.so3 import Array
 
@@ -25,11 +26,6 @@ TAPE_M = 0.005
 """Standard deviation of an arm length measured with a tape."""
 
 _LEAST_TURNING_RAD = math.radians(2.0)
-
-ElbowFrom = Literal["posture", "exoskeleton"]
-
-# The arm frame's axes seen from the elbow frame: z of the arm is y of the elbow frame (docs/frames.md).
-_ELW_FROM_ARM = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,7 +78,7 @@ class Found:
     range_rad: Array
 
 
-def solve(session: Session, hold: Hold, old: Calibration, elbow_from: ElbowFrom, arm_length_m: float | None) -> Found:
+def solve(session: Session, hold: Hold, old: Calibration, elbow_from: ArmAxis, arm_length_m: float | None) -> Found:
     """Return what a session tells.
 
     Args:
@@ -100,9 +96,9 @@ def solve(session: Session, hold: Hold, old: Calibration, elbow_from: ElbowFrom,
     gh = find_centre(session.e_from_m0, session.e_from_m1, block)
     pivot = _pivot(session, block)
     # The neutral posture has all angles zero: arm and GH frame are E there.
-    m1_from_elw_rotation = hold.e_from_m1.T @ _ELW_FROM_ARM.T
+    m1_from_elw_rotation = hold.e_from_m1.T @ ELW_FROM_ARM.T
     along = m1_from_elw_rotation[:, 1]
-    if elbow_from == "exoskeleton":
+    if elbow_from is ArmAxis.EXOSKELETON:
         if pivot is None:
             raise BadInputError(
                 "--elbow exoskeleton: the elbow has hardly moved, or about one axis alone, so that its centre is unknown; "
@@ -198,7 +194,7 @@ def _forearm(session: Session, hold: Hold, m1_from_elw: Array) -> tuple[float | 
 
 def _range(session: Session, m0_from_gh: Array, m1_from_elw: Array) -> Array:
     gh_from_e = m0_from_gh[:3, :3].T @ np.swapaxes(session.e_from_m0[:, :3, :3], 1, 2)
-    gh_from_arm = gh_from_e @ session.e_from_m1[:, :3, :3] @ m1_from_elw[:3, :3] @ _ELW_FROM_ARM
+    gh_from_arm = gh_from_e @ session.e_from_m1[:, :3, :3] @ m1_from_elw[:3, :3] @ ELW_FROM_ARM
     angles = np.array([(e.a_rad, e.b_rad, e.g_rad) for e in map(euler_yxz, gh_from_arm)])
     low, high = np.percentile(np.unwrap(angles, axis=0), (1.0, 99.0), axis=0)
     return np.asarray(high - low)

@@ -32,6 +32,10 @@ BENT_RAD = (math.radians(50.0), math.radians(130.0))
 LEAST_ARM_M, GREATEST_ARM_M = 0.15, 0.50
 GREATEST_CENTRE_M = 0.30
 """Farther from its marker m0 the GH centre cannot be."""
+GREATEST_ELBOW_M = 0.40
+"""Farther from its marker m1 the elbow cannot be."""
+GREATEST_LINK_M = 0.80
+"""Farther from the link that carries camera r1 it cannot be, either."""
 
 
 class Refusal(StrEnum):
@@ -43,6 +47,7 @@ class Refusal(StrEnum):
     CENTRE_UNCERTAIN = "centre_uncertain"
     RESIDUAL_TOO_LARGE = "residual_too_large"
     NOT_NEUTRAL = "not_neutral"
+    POSTURE_UNCHECKED = "posture_unchecked"
     ELBOW_NOT_BENT = "elbow_not_bent"
     IMPLAUSIBLE = "implausible"
 
@@ -62,12 +67,11 @@ class Objection:
 
 def object_to_view(session: Session) -> list[Objection]:
     """Return what is wrong with what was seen at all."""
-    seconds = len(session.t_s) * (float(session.t_s[-1]) / max(len(session.t_s) - 1, 1) if len(session.t_s) else 0.0)
-    if session.seen_fraction >= LEAST_SEEN and seconds >= LEAST_SEEN_S:
+    if session.seen_fraction >= LEAST_SEEN and session.seen_s >= LEAST_SEEN_S:
         return []
     reasons = ", ".join(f"{reason} x{count}" for reason, count in sorted(session.missing.items(), key=lambda item: -item[1]))
     text = (
-        f"both markers are known during {100 * session.seen_fraction:.0f} % of the session only, {len(session.t_s)} samples"
+        f"both markers are known during {100 * session.seen_fraction:.0f} % of the session only, {session.seen_s:.1f} s"
         f"{f' (missing: {reasons})' if reasons else ''}; at least {100 * LEAST_SEEN:.0f} % and {LEAST_SEEN_S:g} s are needed: "
         "look at both cameras' views (`ghest-rt doctor --live 5`, Foxglove) and record again"
     )
@@ -79,23 +83,46 @@ def object_to_hold(hold: Hold | None) -> list[Objection]:
     if hold is not None:
         return []
     text = (
-        f"no posture is held still for {LEAST_S:g} s within the first {BEGINS_WITHIN_S:g} s (markers within "
-        f"{math.degrees(STILL_RAD):.1f}° RMS): begin the session in the neutral posture, supported, and hold it for 4 s"
+        f"no posture is held still for {LEAST_S:g} s within the first {BEGINS_WITHIN_S:g} s (both markers known for most of "
+        f"it, within {math.degrees(STILL_RAD):.1f}° RMS): begin the session in the neutral posture, supported, and hold it for "
+        "4 s in both cameras' views"
     )
     return [Objection(Refusal.NOT_STILL, text)]
 
 
-def object_to_movement(found: Found) -> list[Objection]:
-    """Return what is wrong with the rest."""
-    objections = [*_range(found.range_rad), *_centre(found), *_posture(found)]
+def object_to_movement(found: Found, *, posture_unchecked: bool) -> list[Objection]:
+    """Return what is wrong with the rest.
+
+    Args:
+        found: What the session tells.
+        posture_unchecked: Whether a neutral posture that nothing vouches for is taken.
+    """
+    return [
+        *_range(found.range_rad),
+        *_centre(found),
+        *_posture(found, unchecked=posture_unchecked),
+        *_geometry(found),
+    ]
+
+
+def _geometry(found: Found) -> list[Objection]:
+    """Refuse what no limb is like; what is left, the station file takes."""
     arm_m, m0_m = found.length.metres, float(np.linalg.norm(found.gh.first_m))
-    if not LEAST_ARM_M <= arm_m <= GREATEST_ARM_M or m0_m > GREATEST_CENTRE_M:
-        text = (
-            f"a GH centre {1000 * m0_m:.0f} mm from m0 and {1000 * arm_m:.0f} mm from the elbow is no shoulder's: "
-            "look at markers.*.half_spacing_m, calibration.link_from_camera and which camera is which"
-        )
-        objections.append(Objection(Refusal.IMPLAUSIBLE, text))
-    return objections
+    m1_m, link_m = float(np.linalg.norm(found.m1_from_elw[:3, 3])), float(np.linalg.norm(found.elbow_in_link_m))
+    possible = (
+        LEAST_ARM_M <= arm_m <= GREATEST_ARM_M
+        and m0_m <= GREATEST_CENTRE_M
+        and m1_m <= GREATEST_ELBOW_M
+        and link_m <= GREATEST_LINK_M
+    )
+    if possible:
+        return []
+    text = (
+        f"a GH centre {1000 * m0_m:.0f} mm from m0 and {1000 * arm_m:.0f} mm from the elbow, the elbow {1000 * m1_m:.0f} mm "
+        f"from m1 and {1000 * link_m:.0f} mm from camera r1's link, is no shoulder's: look at markers.*.half_spacing_m, "
+        "calibration.link_from_camera, which camera is which, and whether the encoders move"
+    )
+    return [Objection(Refusal.IMPLAUSIBLE, text)]
 
 
 def _range(range_rad: Array) -> list[Objection]:
@@ -140,8 +167,15 @@ def _centre(found: Found) -> list[Objection]:
     return objections
 
 
-def _posture(found: Found) -> list[Objection]:
+def _posture(found: Found, *, unchecked: bool) -> list[Objection]:
     objections = []
+    if found.pivot_off_rad is None and not unchecked:  # the forearm cannot see where the arm points
+        text = (
+            "whether the arm pointed forward and level in the neutral posture cannot be checked, since the elbow has hardly "
+            "moved, or about one axis alone: bend and stretch it by 25° both ways at the end of the session, or, if a spirit "
+            "level has shown the posture to be right, add --posture-unchecked"
+        )
+        objections.append(Objection(Refusal.POSTURE_UNCHECKED, text))
     off = {
         "the arm points": found.pivot_off_rad,
         "the forearm stands": None if found.forearm_twist_rad is None else abs(found.forearm_twist_rad),

@@ -2,6 +2,7 @@
 
 import logging
 import math
+from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
 
@@ -9,13 +10,17 @@ from rich import box
 from rich.console import Console
 from rich.progress import Progress
 from rich.table import Table
+from rich.text import Text
 
-from ghest_rt.calibration.calibrate import CalibrationOptions, Outcome, calibrate, check_joint, id_from, new_station_text
+from ghest_rt.calibration.arm_axis import ArmAxis
+from ghest_rt.calibration.calibrate import Outcome, calibrate, check_joint, id_from, new_station_text
+from ghest_rt.calibration.options import CalibrationOptions
 from ghest_rt.calibration.report import notes_of, rows_of
 from ghest_rt.calibration.session import Session, read_session
-from ghest_rt.calibration.solve import ElbowFrom, Found
-from ghest_rt.cli.console import print_json
+from ghest_rt.calibration.solve import Found
+from ghest_rt.cli.console import print_json, printing
 from ghest_rt.config.load import LoadedStation, load_station
+from ghest_rt.config.station import StationConfig
 from ghest_rt.errors import BadInputError
 from ghest_rt.extras import need_extra
 from ghest_rt.recording.reader import Recording
@@ -32,17 +37,18 @@ def calibrate_recording(
     out: Path,
     *,
     calibration_id: str | None = None,
-    elbow_from: ElbowFrom = "posture",
+    elbow_from: ArmAxis = ArmAxis.POSTURE,
     arm_length_m: float | None = None,
+    posture_unchecked: bool = False,
     picture: Path | None = None,
     force: bool = False,
     as_json: bool = False,
 ) -> None:
-    """Calibrate, print what has changed, and write the new station file if the session is good enough.
+    """Calibrate, write the new station file if the session is good enough, and print what has changed.
 
     Raises:
         BadInputError: A file or option cannot be used, or the session is not good enough: says why and what to do.
-        GhestError: The extra `plots` is missing for a picture.
+        GhestError: The extra `plots` is missing for a picture; standard output is full, the new station file written.
     """
     station = load_station(station_file)
     check_joint(station)
@@ -51,16 +57,19 @@ def calibrate_recording(
         if picture.suffix.lower() not in _PICTURES or not picture.parent.is_dir():
             raise BadInputError(f"{picture}: name a file that ends in {', '.join(_PICTURES)}, in a folder that is there")
         need_extra("plots", "a picture")
-    recording = Recording(path)
     options = CalibrationOptions(
-        calibration_id=calibration_id or id_from(path, station.config.calibration.id),
+        calibration_id=id_from(path, station.config.calibration.id) if calibration_id is None else calibration_id,
         elbow_from=elbow_from,
         arm_length_m=arm_length_m,
+        posture_unchecked=posture_unchecked,
     )
+    recording = Recording(path)
     session = _read(recording, station)
     for problem in recording.problems:
         _log.warning("%s: %s", path, problem)
     outcome = calibrate(session, station, options)
+    if outcome.found is not None and outcome.calibration is not None:
+        _write(out, new_station_text(station, outcome.calibration, outcome.found.hold, path.name))
     if picture is not None and outcome.found is not None:
         from ghest_rt.calibration.picture import draw_calibration  # noqa: PLC0415 - an extra, imported only when used
 
@@ -68,14 +77,11 @@ def calibrate_recording(
     if as_json:
         print_json(_document(path, out, station, session, outcome))
     else:
-        _print(path, station, session, outcome)
-    if outcome.objections or outcome.found is None or outcome.calibration is None:
+        with printing():
+            _print(path, out, station, session, outcome)
+    if outcome.calibration is None:
         reasons = "\n".join(f"  {objection.text}" for objection in outcome.objections)
         raise BadInputError(f"{path}: not good enough to calibrate by; {out} is not written:\n{reasons}")
-    text = new_station_text(station, outcome.calibration, outcome.found.hold, path.name)
-    _write(out, text)
-    if not as_json:
-        Console().print(f"{out}: calibration {outcome.calibration.id}", highlight=False, markup=False)
 
 
 def _read(recording: Recording, station: LoadedStation) -> Session:
@@ -89,13 +95,30 @@ def _check_out(out: Path, station_file: Path, station: LoadedStation, *, force: 
     """Refuse an output file before the long part of the work.
 
     Raises:
-        BadInputError: It is there, or its folder lacks the URDF that it would name.
+        BadInputError: It is there, or its folder lacks a file that it would name.
     """
     if out.exists() and not force:
         raise BadInputError(f"{out}: is there already; name another file, or overwrite it with --force")
-    urdf = station.config.exoskeleton.urdf
-    if not (out.parent / urdf).is_file():
-        raise BadInputError(f"{out}: the station file names {urdf} beside itself; write the new one beside {station_file}")
+    if out.is_dir() or not out.parent.is_dir():
+        raise BadInputError(f"{out}: name a file, in a folder that is there")
+    for key, name in _named(station.config):
+        if (station_file.parent / name).exists() and not (out.parent / name).exists():
+            raise BadInputError(
+                f"{out}: {key} = {name!r} is looked for beside the station file, and is not there: "
+                f"write the new file beside {station_file}, or give an absolute path in it"
+            )
+
+
+def _named(config: StationConfig) -> Iterator[tuple[str, str]]:
+    """Yield what a station file names by paths relative to itself, by key."""
+    yield "exoskeleton.urdf", config.exoskeleton.urdf
+    devices = {f"cameras.{name}.device": camera.device for name, camera in config.cameras.items()}
+    for key, device in {**devices, "encoders.device": config.encoders.device}.items():
+        for field in ("dbc", "path"):
+            if hasattr(device, field):
+                yield f"{key}.{field}", str(getattr(device, field))
+    if config.publisher.identity is not None:
+        yield "publisher.identity", config.publisher.identity
 
 
 def _write(out: Path, text: str) -> None:
@@ -109,16 +132,16 @@ def _write(out: Path, text: str) -> None:
         part.unlink(missing_ok=True)
 
 
-def _print(path: Path, station: LoadedStation, session: Session, outcome: Outcome) -> None:
+def _print(path: Path, out: Path, station: LoadedStation, session: Session, outcome: Outcome) -> None:
     console = Console()
-    found, new = outcome.found, outcome.calibration
-    if found is None or new is None:
+    found = outcome.found
+    if found is None:
         return
-    table = Table(title=f"Calibration from {path.name}", title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
+    table = Table(title=Text(f"Calibration from {path.name}"), title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
     table.add_column("quantity", no_wrap=True)
     for column in ("before", "after", "change", "std. dev."):
         table.add_column(column, justify="right", overflow="fold")
-    for row in rows_of(station.config.calibration, new, found):
+    for row in rows_of(station.config.calibration, found):
         table.add_row(row.quantity, row.before, row.after, row.change, row.sigma)
     console.print(table)
     console.print(
@@ -128,6 +151,8 @@ def _print(path: Path, station: LoadedStation, session: Session, outcome: Outcom
         console.print(f"- {line}", highlight=False, markup=False)
     verdict = "not good enough" if outcome.objections else "good"
     console.print(f"verdict: {verdict}", style="red" if outcome.objections else "green", highlight=False)
+    if outcome.calibration is not None:
+        console.print(f"{out}: calibration {outcome.calibration.id}", highlight=False, markup=False)
 
 
 def _quality(session: Session, found: Found) -> list[str]:
@@ -150,10 +175,10 @@ def _document(path: Path, out: Path, station: LoadedStation, session: Session, o
         "seen_fraction": session.seen_fraction,
     }
     found, new = outcome.found, outcome.calibration
-    if found is not None and new is not None:
+    if found is not None:
         document |= {
-            "calibration": new.model_dump(),
-            "rows": [asdict(row) for row in rows_of(station.config.calibration, new, found)],
+            "calibration": None if new is None else new.model_dump(),
+            "rows": [asdict(row) for row in rows_of(station.config.calibration, found)],
             "notes": notes_of(found),
             "residual_rms_m": found.gh.residual_rms_m,
             "outlier_fraction": 1.0 - float(found.gh.used.mean()),

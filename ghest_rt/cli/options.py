@@ -41,13 +41,6 @@ class Side(StrEnum):
     LEFT = "left"
 
 
-class ArmAxis(StrEnum):
-    """What gives the upper arm's axis in a calibration."""
-
-    POSTURE = "posture"
-    EXOSKELETON = "exoskeleton"
-
-
 class MarkerTexture(StrEnum):
     """What simulated marker plates carry."""
 

@@ -7,6 +7,10 @@ import numpy as np
 from ghest_rt.geometry.se3 import inverse
 from ghest_rt.geometry.so3 import Array
 
+ELW_FROM_ARM = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
+"""(3, 3) axes of the arm in the elbow frame, docs/frames.md: y of the elbow frame is z of the arm."""
+ELW_FROM_ARM.flags.writeable = False
+
 # Shorter than this (metres), GH centre and elbow are one point and give no direction.
 _SHORTEST_ARM_M = 1e-3
 # The sine below which the marker's x axis lies along the arm and gives no twist.

@@ -5,6 +5,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ghest_rt.calibration.session import Session
 from ghest_rt.geometry.se3 import inverse, transform
@@ -39,10 +40,11 @@ def session(
     noise_m: float = 0.0005,
     noise_rad: float = 0.002,
     seed: int = 0,
+    rate_hz: float = RATE_HZ,
 ) -> Session:
     """Return a session of that movement, right arm."""
     rng = np.random.default_rng(seed)
-    times = np.arange(0.0, seconds, 1.0 / RATE_HZ)
+    times = np.arange(0.0, seconds, 1.0 / rate_hz)
     m0, m1, link, forearm = [], [], [], []
     for t_s in times.tolist():
         a, b, g, bend = movement(t_s)
@@ -59,7 +61,7 @@ def session(
         m1.append(e_from_elw @ inverse(M1_FROM_ELW) @ noisy[1])
         link.append(e_from_link)
         forearm.append(e_from_link[:3, :3] @ np.array([0.0, 0.0, -1.0]))
-    return Session(times, np.array(m0), np.array(m1), np.array(link), np.array(forearm), len(times), {})
+    return Session(times, np.array(m0), np.array(m1), np.array(link), np.array(forearm), len(times), {}, 1.0 / rate_hz)
 
 
 def with_slide(whole: Session, from_s: float, slide_m: Array) -> Session:
@@ -71,8 +73,19 @@ def with_slide(whole: Session, from_s: float, slide_m: Array) -> Session:
 
 
 def only(whole: Session, share: float) -> Session:
-    """Return the session with some of its instants, evenly spread, as if the others had not been seen."""
-    kept = np.flatnonzero(np.diff(np.floor(np.arange(len(whole.t_s) + 1) * share)) > 0)
+    """Return the session with a share of its instants, evenly spread."""
+    return at(whole, np.flatnonzero(np.diff(np.floor(np.arange(len(whole.t_s) + 1) * share)) > 0))
+
+
+def with_wander(whole: Session, wander_m: float) -> Session:
+    """Return the session with m0 wandering to and fro along all axes of E."""
+    wandering = whole.e_from_m0.copy()
+    wandering[:, :3, 3] += wander_m * np.sin(np.outer(whole.t_s, (1.9, 2.9, 0.9)))
+    return replace(whole, e_from_m0=wandering)
+
+
+def at(whole: Session, kept: NDArray[np.int64]) -> Session:
+    """Return the session with some of its instants, by number, as if the others had not been seen."""
     assert whole.forearm_in_e is not None
     return replace(
         whole,
@@ -83,3 +96,11 @@ def only(whole: Session, share: float) -> Session:
         forearm_in_e=whole.forearm_in_e[kept],
         missing={"m1_not_seen": len(whole.t_s) - len(kept)},
     )
+
+
+def with_frozen_encoders(whole: Session) -> Session:
+    """Return the session as it looks when the encoders tell the same all the time: camera r1 seems to stand still."""
+    assert whole.forearm_in_e is not None
+    link = np.broadcast_to(whole.e_from_link[0], whole.e_from_link.shape)
+    m1 = np.array([link[0] @ inverse(then) @ pose for then, pose in zip(whole.e_from_link, whole.e_from_m1, strict=True)])
+    return replace(whole, e_from_link=link, e_from_m1=m1, forearm_in_e=np.broadcast_to(whole.forearm_in_e[0], (len(m1), 3)))

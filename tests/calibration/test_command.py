@@ -2,6 +2,7 @@
 
 import json
 import math
+import shutil
 import subprocess
 from pathlib import Path
 
@@ -91,6 +92,28 @@ def test_the_table_says_what_changed_and_what_the_session_cannot_tell(recorded: 
     assert load_station(folder / "new.toml").config.calibration.arm_length_m == 0.33
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("options", [(), ("--json",)])
+def test_a_full_standard_output_does_not_cost_the_new_file(recorded: Path, folder: Path, options: tuple[str, ...]) -> None:
+    words = [recorded, "--station", folder / "station-sim.toml", "--out", folder / "new.toml", *options]
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run(
+            [*COMMAND, "calibrate", *map(str, words)], stdout=full, stderr=subprocess.PIPE, text=True, timeout=120, check=False
+        )
+    assert done.returncode == 1
+    assert "standard output: cannot be written to" in done.stderr
+    assert "Traceback" not in done.stderr
+    assert load_station(folder / "new.toml").config.calibration.id == "tuesday"
+
+
+def test_a_name_that_no_station_file_takes_is_told_before_the_recording_is_opened(folder: Path) -> None:
+    done = run(
+        folder / "none.mcap", "--station", folder / "station-sim.toml", "--out", folder / "new.toml", "--id", "patient 1"
+    )
+    assert done.returncode == 2
+    assert "--id 'patient 1': must be 1 to 64 letters" in done.stderr
+
+
 def test_nothing_is_overwritten_unasked(folder: Path) -> None:
     before = (folder / "station-sim.toml").read_bytes()
     done = run("any.mcap", "--station", folder / "station-sim.toml", "--out", folder / "station-sim.toml")
@@ -122,6 +145,23 @@ def test_a_file_that_could_not_find_its_urdf_is_refused(folder: Path) -> None:
     done = run("any.mcap", "--station", folder / "station-sim.toml", "--out", folder / "elsewhere" / "new.toml")
     assert done.returncode == 2
     assert "armeo_spring.urdf" in done.stderr
+
+
+def test_a_file_that_could_not_find_its_identity_is_refused_until_it_is_there(folder: Path) -> None:
+    station = folder / "station-sim.toml"
+    station.write_text(station.read_text() + '\n[publisher]\nidentity = "bed-1"\n')
+    assert load_station(station).config.publisher.identity == "bed-1"
+    (folder / "bed-1").mkdir()
+    elsewhere = folder / "elsewhere"
+    elsewhere.mkdir()
+    shutil.copy(folder / "armeo_spring.urdf", elsewhere)
+    blank = write_blank_recording(folder / "blank.mcap")
+    done = run(blank, "--station", station, "--out", elsewhere / "new.toml")
+    assert done.returncode == 2
+    assert "publisher.identity = 'bed-1'" in done.stderr
+    assert f"write the new file beside {station}" in done.stderr
+    (elsewhere / "bed-1").mkdir()
+    assert "not good enough" in run(blank, "--station", station, "--out", elsewhere / "new.toml").stderr
 
 
 def test_another_joint_than_the_shoulder_is_refused(folder: Path) -> None:

@@ -5,9 +5,9 @@ from typing import Annotated
 
 import typer
 
+from ghest_rt.calibration.arm_axis import ArmAxis
 from ghest_rt.cli.options import (
     MOVEMENTS,
-    ArmAxis,
     Faults,
     ImageFaults,
     Json,
@@ -173,6 +173,12 @@ def calibrate(
         float | None,
         typer.Option("--arm-length", metavar="METRES", min=0.15, max=0.5, help="From elbow to GH centre as measured"),
     ] = None,
+    posture_unchecked: Annotated[
+        bool,
+        typer.Option(
+            "--posture-unchecked", metavar="", help="Take a neutral posture that the exoskeleton's elbow cannot vouch for"
+        ),
+    ] = False,
     picture: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Picture of the residuals to write: .png, .svg or .pdf")
     ] = None,
@@ -187,8 +193,9 @@ def calibrate(
         station,
         out,
         calibration_id=calibration_id,
-        elbow_from=elbow.value,
+        elbow_from=elbow,
         arm_length_m=arm_length_m,
+        posture_unchecked=posture_unchecked,
         picture=picture,
         force=force,
         as_json=as_json,

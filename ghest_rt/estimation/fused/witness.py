@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from ghest_rt.estimation.arm import ELW_FROM_ARM
 from ghest_rt.estimation.arm_chain import ArmChain
 from ghest_rt.estimation.fused.axial import AxialJudge, Slip, twist_rad
 from ghest_rt.estimation.fused.belief import Belief
@@ -14,8 +15,6 @@ from ghest_rt.geometry.so3 import Array, log_so3
 
 # Elbow and forearm are compared with m1 this often: their disagreement is slow.
 _COMPARE_NS = 40_000_000
-# Axes of the arm in the elbow frame, docs/frames.md: y of the elbow frame is z of the arm.
-_ELW_FROM_ARM = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 
 
 class Witness:
@@ -66,7 +65,7 @@ class Witness:
             return
         elw_from_e = self._chain.m1_from_elw[:3, :3].T @ base.turn @ R.T
         gh_from_e = self._chain.m0_from_gh[:3, :3].T @ belief.base[0].turn @ belief.e_from_marker[0].T
-        gh_from_arm = gh_from_e @ elw_from_e.T @ _ELW_FROM_ARM
+        gh_from_arm = gh_from_e @ elw_from_e.T @ ELW_FROM_ARM
         self._axial.add(sighting.t_ns, elw_from_e @ forearm, twist_rad(gh_from_arm))
 
     def evidence(self, belief: Belief) -> Evidence:
