@@ -122,6 +122,7 @@ def judged(session: Observed, station: LoadedStation, arm_length_m: float) -> di
 
 def run(sensor: str, seed: int, duration_s: float, soft_tissue: str, *, wrong_mounts: bool) -> dict[str, dict[str, float]]:
     """Return the figures of one sensor and seed by variant."""
+    # Sensor and soft tissue are argparse's choices: the names that these options take, which a type checker cannot see.
     base = SimulateOptions(out=Path(), sensor=sensor, seed=seed)  # type: ignore[arg-type]
     world = build_world(replace(base, movement="CAL", soft_tissue=soft_tissue))  # type: ignore[arg-type]
     length_m = anatomy(base.height_m).upper_arm_m
