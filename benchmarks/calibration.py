@@ -143,15 +143,15 @@ def run(sensor: str, seed: int, duration_s: float, soft_tissue: str, *, wrong_mo
 def main() -> None:
     """Judge, print, keep."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--sensors", default="paper,sr300", help="with commas between")
+    parser.add_argument("--sensors", nargs="+", choices=("paper", "sr300"), default=("paper", "sr300"))
     parser.add_argument("--seeds", default="1,2,3", help="with commas between")
     parser.add_argument("--duration", type=float, default=8.0, help="seconds of COMB")
-    parser.add_argument("--soft-tissue", default="none", help="none, published or severe")
+    parser.add_argument("--soft-tissue", choices=("none", "published", "severe"), default="none")
     parser.add_argument("--wrong-mounts", action="store_true", help="both cameras 1° and 3 mm off")
     arguments = parser.parse_args()
     table = Table("sensor", "seed", "station file", *_COLUMNS)
     rows = []
-    for sensor in arguments.sensors.split(","):
+    for sensor in arguments.sensors:
         for seed in map(int, arguments.seeds.split(",")):
             results = run(sensor, seed, arguments.duration, arguments.soft_tissue, wrong_mounts=arguments.wrong_mounts)
             for variant, values in results.items():
