@@ -1,6 +1,6 @@
 """What a calibration is worth: angles of a later session with the true, a spoilt, and the calibrated station file.
 
-`python -m benchmarks.calibration [--sensors paper,sr300] [--seeds 1,2,3] [--duration 8] [--soft-tissue none] [--wrong-mounts]`
+`python -m benchmarks.calibration [--sensors paper sr300] [--seeds 1,2,3] [--duration 8] [--soft-tissue none] [--wrong-mounts]`
 from the project's root. Centres are spoilt by 15 mm and attitudes by 5°, in directions drawn by the seed; the calibration
 session is movement CAL of the same seed, the session judged is COMB of another one, method fused. Soft tissue is that of
 both sessions. With `--wrong-mounts` every station file has both cameras 1° and 3 mm off, the true one as well.
